@@ -1,0 +1,233 @@
+# perigeo: `make help` lists the targets. Needs GNU make 3.81 or later and a POSIX shell.
+#
+# The layers: a module may use only modules that stand before it in this list, from which
+# `make lint` checks all of src/.
+modules := \
+  pd_kinds pd_system pd_errors pd_text pd_files pd_input_types pd_state \
+  pd_cursor pd_namelist pd_keys pd_input_reference pd_input_values pd_used_values \
+  pd_platens pd_input_checks pd_motion_checks pd_input \
+  pd_geometry pd_cloud pd_cells pd_families pd_operators pd_kinematics pd_strain pd_j2 pd_force \
+  pd_boundary pd_verlet pd_stability pd_observe pd_schedule pd_setup pd_summary \
+  pd_version \
+  pd_hdf5_file pd_hdf5 pd_xdmf pd_frames pd_result pd_history pd_checkpoint pd_progress \
+  pd_record pd_command_line perigeo
+
+# ---------------------------------------------------------------------------------- settings
+BUILD  = opt
+MARCH  = native
+PREFIX = /usr/local
+
+ifneq ($(filter default undefined,$(origin FC)),)
+  FC = gfortran
+endif
+
+ifeq ($(BUILD),opt)
+  FFLAGS = -O3
+  march  = $(addprefix -march=,$(MARCH))
+  program = bin/perigeo
+  unit_flags = -O1 -g -fbacktrace
+else ifeq ($(BUILD),debug)
+  FFLAGS = -Og -g -fcheck=all -ffpe-trap=invalid,zero,overflow -finit-real=snan -fbacktrace
+  march  =
+  program = bin/perigeo-debug
+  unit_flags = $(FFLAGS)
+else ifeq ($(BUILD),lint)
+  FFLAGS = -Werror
+  march  =
+  program = build/lint/perigeo
+  unit_flags = $(FFLAGS) $(warnings) -Wno-compare-reals $(no_false_warnings)
+else
+  $(error BUILD=$(BUILD): it must be opt or debug)
+endif
+
+warnings := -Wall -Wextra -Wpedantic -Wimplicit-interface -Wconversion
+# gfortran warns of allocatable variables that are not allocated yet, without reason.
+no_false_warnings := -Wno-uninitialized -Wno-maybe-uninitialized
+ifeq ($(BUILD),lint)
+  warnings += -Wno-maybe-uninitialized
+else
+  warnings += $(no_false_warnings)
+endif
+flags     = -std=f2008 $(strip $(FFLAGS) $(march)) -fopenmp
+venv     := .venv
+build    := build/$(BUILD)
+
+# ---------------------------------------------------------------------------------- targets
+.SUFFIXES:
+.DELETE_ON_ERROR:
+.PHONY: all program objects post debug units demo demo-quick test lint verify \
+  layers setup install help clean distclean
+.DEFAULT_GOAL := all
+
+help_width := 13
+
+all: program post  ## build bin/perigeo and install perigeo-post into .venv (the default)
+
+# Recursive calls compile on all cores unless the user has given -j.
+cores    := $(shell getconf _NPROCESSORS_ONLN 2>/dev/null || echo 2)
+parallel  = $(if $(findstring jobserver,$(MAKEFLAGS)),,-j$(cores))
+submake   = $(MAKE) --no-print-directory
+
+setup:             ## install what is missing: compiler, HDF5, Python packages in .venv
+	@sh tools/setup.sh run
+
+demo:              ## from a fresh machine to the figures of the reference case in results/
+	@sh tools/setup.sh run
+	@$(submake) $(parallel) program
+	@sh tools/demo.sh input/compression.nml results/compression
+
+demo-quick:        ## the same with a coarse body: seconds instead of minutes
+	@sh tools/setup.sh run
+	@$(submake) $(parallel) program
+	@sh tools/demo.sh input/compression_quick.nml results/compression_quick
+
+test:              ## set-up, build and the whole test suite; BUILD=debug: with all checks
+	@sh tools/setup.sh test
+	@$(venv)/bin/python tests/support/run_tests.py --make '$(MAKE)' --build $(BUILD)
+
+debug:             ## build bin/perigeo-debug, which checks bounds and traps invalid numbers
+	@$(submake) BUILD=debug program
+
+layers:
+	@echo $(modules)
+
+lint:              ## compiler warnings as errors, Fortran and Python linters, layer check
+	@sh tools/setup.sh lint
+	@sh tools/lint.sh '$(MAKE)' $(parallel)
+
+verify:            ## compare computed values with closed forms, printed as a table
+	@sh tools/setup.sh test
+	@$(submake) $(parallel) program
+	@$(venv)/bin/python tests/verify/verify.py
+
+install: program   ## copy the program to PREFIX/bin (PREFIX=/usr/local)
+	mkdir -p '$(DESTDIR)$(PREFIX)/bin'
+	cp $(program) '$(DESTDIR)$(PREFIX)/bin/'
+
+clean:             ## remove what was built; keeps .venv and results
+	rm -rf build bin
+
+distclean: clean   ## remove .venv and results too
+	rm -rf $(venv) results
+
+help:              ## list the targets
+	@echo 'Targets:'
+	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' Makefile
+	@echo 'Settings:'
+	@echo '  MARCH=x86-64-v3   processor to compile for (native; empty: any)'
+	@echo '  FFLAGS=-O2        optimisation flags (-O3)'
+	@echo '  BUILD=debug       with make test: use the program with all checks'
+	@echo '  FC=, H5FC=        Fortran compiler (gfortran) and HDF5 wrapper (h5fc)'
+	@echo '  PFUNIT_DIR=DIR    with make test: use the pFUnit installed in DIR'
+	@echo '  NO_INSTALL=1      never install anything'
+	@echo '  V=1               show the commands'
+
+# ---------------------------------------------------------------------------------- compiling
+# The rest needs the compiler and HDF5, which `make demo` may have to install first.
+ifneq ($(filter-out setup demo demo-quick test debug lint verify layers help clean \
+  distclean,\
+  $(or $(MAKECMDGOALS),all)),)
+
+ifeq ($(shell command -v $(firstword $(FC)) 2>/dev/null),)
+  $(error no Fortran compiler ($(FC)): run tools/setup.sh, which installs or names what is missing)
+endif
+# Not every gfortran knows the processor it runs on.
+ifeq ($(MARCH),native)
+  ifeq ($(shell echo end | $(FC) -march=native -fsyntax-only -x f95 - 2>/dev/null && echo yes),)
+    march =
+  endif
+endif
+hdf5_compile := $(shell H5FC='$(H5FC)' sh tools/hdf5_flags.sh compile '$(FC)')
+hdf5_link    := $(shell H5FC='$(H5FC)' sh tools/hdf5_flags.sh link '$(FC)')
+ifeq ($(hdf5_link),)
+  $(error no HDF5 library for Fortran: run tools/setup.sh, which installs or names what is missing)
+endif
+
+sources := $(wildcard src/*.f90)
+objects := $(patsubst src/%.f90,$(build)/%.o,$(sources)) $(build)/pd_version.o
+compile  = $(FC) $(flags) $(warnings) $(hdf5_compile) -J$(build)
+say      = $(if $(V),,@echo '  $(1)';)
+
+# These files change only when their contents do: what everything depends on, and the version.
+update := $(shell mkdir -p $(build)/unit bin; \
+  echo '$(compile) $(hdf5_link)' | sh tools/update_file.sh $(build)/flags; \
+  sh tools/version.sh '$(FC)' '$(flags)' | sh tools/update_file.sh $(build)/pd_version.f90)
+
+program: $(if $(wildcard src/perigeo.f90),$(program),objects)
+objects: $(objects)
+
+$(program): $(objects)
+	$(call say,link     $@)$(FC) $(flags) -o $@ $(objects) $(hdf5_link)
+
+$(build)/%.o: src/%.f90 $(build)/flags
+	$(call say,compile  $<)$(compile) -c $< -o $@
+
+$(build)/pd_version.o: $(build)/pd_version.f90 $(build)/flags
+	$(call say,compile  $<)$(compile) -c $< -o $@
+
+# Python is optional here: without it the program is built all the same.
+post:
+	@sh tools/python_env.sh run || \
+	  echo 'perigeo-post is not installed; the program does not need it.'
+
+# ---------------------------------------------------------------------------------- unit tests
+# One program for each suite tests/unit/test_*.pf, with pFUnit or with the small runner in
+# tests/support. Modules that suites share are tests/unit/*.f90.
+python  := $(firstword $(wildcard $(venv)/bin/python) python3)
+suites  := $(patsubst tests/unit/%.pf,%,$(wildcard tests/unit/test_*.pf))
+support := tests/support
+
+ifneq ($(PFUNIT_DIR),)
+  pfunit_mk := $(firstword $(wildcard $(PFUNIT_DIR)/PFUNIT-*/include/PFUNIT.mk \
+    $(PFUNIT_DIR)/include/PFUNIT.mk))
+  ifeq ($(pfunit_mk),)
+    $(error PFUNIT_DIR=$(PFUNIT_DIR): no PFUNIT.mk there; name the folder pFUnit was installed to)
+  endif
+  include $(pfunit_mk)
+  unit      := $(build)/unit-pfunit
+  runner    :=
+  translate  = $(python) $(PFUNIT_BIN_DIR)/funitproc -quiet $(1) $(2)
+  unit_form := F90
+  unit_std  := -cpp
+  unit_with  = $(PFUNIT_EXTRA_FFLAGS)
+  unit_libs  = $(PFUNIT_LIBRARIES)
+  driver     = -D_TEST_SUITES='"$(1).inc"' -I$(unit)/$(1).modules $(PFUNIT_INCLUDE_DIR)/driver.F90
+else
+  unit      := $(build)/unit
+  runner    := $(unit)/funit.o
+  translate  = $(python) $(support)/pf_to_f90.py $(1) $(2)
+  unit_form := f90
+  unit_std  := -std=f2008
+endif
+
+unit_compile = $(FC) $(unit_std) $(strip $(unit_flags)) -fopenmp -ffree-line-length-none \
+  -I$(build) $(hdf5_compile) $(unit_with)
+
+units: $(suites:%=$(unit)/%)
+
+$(unit)/funit.o: $(support)/funit.f90 $(unit)/flags
+	$(call say,compile  $<)$(unit_compile) -J$(unit) -c $< -o $@
+
+$(unit)/%.o: tests/unit/%.f90 $(unit)/flags
+	$(call say,compile  $<)$(unit_compile) -J$(unit) -c $< -o $@
+
+$(unit)/%.$(unit_form): tests/unit/%.pf $(support)/pf_to_f90.py
+	@$(call translate,$<,$@)
+
+# Modules of a suite go to a folder of its own: with pFUnit every driver has the same names. What
+# a suite is linked with is in depends.mk.
+$(suites:%=$(unit)/%): $(unit)/%: $(unit)/%.$(unit_form) $(runner)
+	@mkdir -p $@.modules
+	@echo 'ADD_TEST_SUITE($*_suite)' > $@.modules/$*.inc
+	$(call say,compile  tests/unit/$*.pf)$(unit_compile) -I$(unit) -J$@.modules -o $@ $< \
+	  $(call driver,$*) $(filter %.o,$^) $(unit_libs) $(hdf5_link)
+
+# Who uses whom, written anew when it has changed.
+update := $(shell mkdir -p $(unit); \
+  echo '$(unit_compile) $(hdf5_link)' | sh tools/update_file.sh $(unit)/flags; \
+  awk -f tools/depends.awk -v build=$(build) -v unit=$(unit) $(sources) \
+    $(wildcard tests/unit/*.f90 tests/unit/test_*.pf) | \
+    sh tools/update_file.sh $(unit)/depends.mk)
+include $(unit)/depends.mk
+
+endif

@@ -1,0 +1,290 @@
+!> Checkpoints `<stem>_checkpoint.h5`: all that a run needs to go on, and the one before it.
+!>
+!> A checkpoint is written under another name, brought to the disk, read back, and only then put in
+!> place, the one before it becoming `<stem>_checkpoint_previous.h5`: at every moment one of them
+!> is whole. A sum over all bytes of the file stands in its first 512 bytes, which HDF5 leaves
+!> to the user; it is checked before HDF5 sees the file.
+module pd_checkpoint
+  use, intrinsic :: iso_fortran_env, only: int8, int32
+  use pd_errors, only: error_list_t
+  use pd_files, only: file_exists, patch_file, replace_file, sync_file
+  use pd_hdf5, only: close_file, create_file, create_group, hdf5_file_t, open_file, &
+    read_attribute, read_dataset, write_attribute, write_dataset
+  use pd_kinds, only: i8, wp
+  use pd_state, only: state_t
+  use pd_system, only: remove_file, rename_file
+  implicit none
+  private
+
+  public :: checkpoint_t, write_checkpoint, read_checkpoint, checkpoint_exists, remove_checkpoints
+
+  !> What a run needs beside its state.
+  type :: checkpoint_t
+    integer  :: step = 0
+    real(wp) :: time = 0.0_wp           !! [s]
+    real(wp) :: time_step = 0.0_wp      !! [s]
+    integer  :: history_rows = 0        !! written so far
+    integer  :: frames_written = 0      !! written so far, 000000 among them
+    character(:), allocatable :: ledger_names(:)
+    real(wp),     allocatable :: ledger(:)          !! any numbers, by these names
+    character(:), allocatable :: input(:)           !! the values of the input as used
+    real(wp),     allocatable :: position(:, :)     !! (n,2) [m]
+    real(wp),     allocatable :: volume(:)          !! (n) [m^2]
+  end type checkpoint_t
+
+  integer, parameter :: head_length = 512
+  integer, parameter :: schema_version = 1
+  character(*), parameter :: schema = 'perigeo checkpoint'
+
+contains
+
+  logical function checkpoint_exists(stem)
+    character(*), intent(in) :: stem   !! output folder and name of the run
+
+    checkpoint_exists = any([file_exists(newest(stem)), file_exists(previous(stem))])
+  end function checkpoint_exists
+
+  !> Remove the checkpoints of an earlier run.
+  !>
+  !> Errors: one of them cannot be removed.
+  subroutine remove_checkpoints(stem, errors)
+    character(*),       intent(in)    :: stem
+    type(error_list_t), intent(inout) :: errors
+    logical :: ignored
+
+    ignored = remove_file(newest(stem)//'.tmp')
+    ignored = remove_file(newest(stem))
+    ignored = remove_file(previous(stem))
+    if (.not. checkpoint_exists(stem)) return
+    call errors%add('the checkpoint of an earlier run cannot be removed', where=newest(stem))
+  end subroutine remove_checkpoints
+
+  !> Write a checkpoint; the newest so far becomes the previous one.
+  !>
+  !> Errors: it cannot be written; the checkpoints so far are then as they were.
+  subroutine write_checkpoint(stem, checkpoint, state, errors)
+    character(*),       intent(in)    :: stem   !! output folder and name of the run
+    type(checkpoint_t), intent(in)    :: checkpoint
+    type(state_t),      intent(in)    :: state
+    type(error_list_t), intent(inout) :: errors
+    character(:), allocatable :: temporary
+    type(hdf5_file_t) :: file
+    integer :: before
+    logical :: ignored
+
+    before = errors%count()
+    temporary = newest(stem)//'.tmp'
+    call create_file(file, temporary, head_length, errors)
+    call write_numbers(file, checkpoint, errors)
+    call write_state(file, state, errors)
+    call close_file(file, errors)
+    if (errors%count() == before) call patch_file(temporary, head(temporary), errors)
+    if (errors%count() == before) call sync_file(temporary, errors)
+    if (errors%count() == before) then
+      if (.not. is_whole(temporary)) then
+        call errors%add('the checkpoint was written but reads back differently', where=temporary)
+      end if
+    end if
+    if (errors%count() > before) then
+      ignored = remove_file(temporary)
+      return
+    end if
+    ! a damaged one must not push out the whole one before it
+    if (is_whole(newest(stem))) ignored = rename_file(newest(stem), previous(stem))
+    call replace_file(temporary, newest(stem), errors)
+  end subroutine write_checkpoint
+
+  !> Read the newest checkpoint that is whole.
+  !>
+  !> `warning`: what the user should know where that is the previous one, otherwise ''.
+  !> Errors: there is none, or none is whole.
+  subroutine read_checkpoint(stem, checkpoint, state, warning, errors)
+    character(*),              intent(in)    :: stem
+    type(checkpoint_t),        intent(out)   :: checkpoint
+    type(state_t),             intent(out)   :: state
+    character(:), allocatable, intent(out)   :: warning
+    type(error_list_t),        intent(inout) :: errors
+
+    warning = ''
+    if (.not. checkpoint_exists(stem)) then
+      call errors%add('there is no checkpoint to go on from', where=newest(stem))
+    else if (is_whole(newest(stem))) then
+      call read_whole(newest(stem), checkpoint, state, errors)
+    else if (is_whole(previous(stem))) then
+      warning = newest(stem)//' is missing or damaged; going on from '//previous(stem)
+      call read_whole(previous(stem), checkpoint, state, errors)
+    else
+      call errors%add('the checkpoint is damaged, and there is no whole one before it', &
+        where=newest(stem))
+    end if
+  end subroutine read_checkpoint
+
+  subroutine write_numbers(file, checkpoint, errors)
+    type(hdf5_file_t),  intent(inout) :: file
+    type(checkpoint_t), intent(in)    :: checkpoint
+    type(error_list_t), intent(inout) :: errors
+
+    call write_attribute(file, '/', 'schema', schema, errors)
+    call write_attribute(file, '/', 'schema_version', schema_version, errors)
+    call write_attribute(file, '/', 'step', checkpoint%step, errors)
+    call write_attribute(file, '/', 'time', checkpoint%time, errors)
+    call write_attribute(file, '/', 'time_step', checkpoint%time_step, errors)
+    call write_attribute(file, '/', 'history_rows', checkpoint%history_rows, errors)
+    call write_attribute(file, '/', 'frames_written', checkpoint%frames_written, errors)
+    call write_dataset(file, '/ledger_names', checkpoint%ledger_names, errors)
+    call write_dataset(file, '/ledger', checkpoint%ledger, errors)
+    call write_dataset(file, '/input', checkpoint%input, errors)
+    call write_dataset(file, '/position', checkpoint%position, errors)
+    call write_dataset(file, '/volume', checkpoint%volume, errors)
+  end subroutine write_numbers
+
+  subroutine write_state(file, state, errors)
+    type(hdf5_file_t),  intent(inout) :: file
+    type(state_t),      intent(in)    :: state
+    type(error_list_t), intent(inout) :: errors
+
+    call create_group(file, '/state', errors)
+    call write_dataset(file, '/state/displacement', state%displacement, errors)
+    call write_dataset(file, '/state/velocity', state%velocity, errors)
+    call write_dataset(file, '/state/force', state%force, errors)
+    call write_dataset(file, '/state/deformation_gradient', state%deformation_gradient, errors)
+    call write_dataset(file, '/state/stress', state%stress, errors)
+    call write_dataset(file, '/state/plastic_strain', state%plastic_strain, errors)
+    call write_dataset(file, '/state/back_stress', state%back_stress, errors)
+    call write_dataset(file, '/state/alpha', state%alpha, errors)
+  end subroutine write_state
+
+  subroutine read_whole(path, checkpoint, state, errors)
+    character(*),       intent(in)    :: path
+    type(checkpoint_t), intent(inout) :: checkpoint
+    type(state_t),      intent(inout) :: state
+    type(error_list_t), intent(inout) :: errors
+    type(hdf5_file_t) :: file
+    character(:), allocatable :: found
+    integer :: version
+
+    call open_file(file, path, .false., errors)
+    call read_attribute(file, '/', 'schema', found, errors)
+    call read_attribute(file, '/', 'schema_version', version, errors)
+    if (file%is_good() .and. (found /= schema .or. version /= schema_version)) then
+      call errors%add('is not a checkpoint of this version of the program', where=path)
+    else
+      call read_numbers(file, checkpoint, errors)
+      call read_state(file, state, errors)
+    end if
+    call close_file(file, errors)
+  end subroutine read_whole
+
+  subroutine read_numbers(file, checkpoint, errors)
+    type(hdf5_file_t),  intent(inout) :: file
+    type(checkpoint_t), intent(inout) :: checkpoint
+    type(error_list_t), intent(inout) :: errors
+
+    call read_attribute(file, '/', 'step', checkpoint%step, errors)
+    call read_attribute(file, '/', 'time', checkpoint%time, errors)
+    call read_attribute(file, '/', 'time_step', checkpoint%time_step, errors)
+    call read_attribute(file, '/', 'history_rows', checkpoint%history_rows, errors)
+    call read_attribute(file, '/', 'frames_written', checkpoint%frames_written, errors)
+    call read_dataset(file, '/ledger_names', checkpoint%ledger_names, errors)
+    call read_dataset(file, '/ledger', checkpoint%ledger, errors)
+    call read_dataset(file, '/input', checkpoint%input, errors)
+    call read_dataset(file, '/position', checkpoint%position, errors)
+    call read_dataset(file, '/volume', checkpoint%volume, errors)
+  end subroutine read_numbers
+
+  subroutine read_state(file, state, errors)
+    type(hdf5_file_t),  intent(inout) :: file
+    type(state_t),      intent(inout) :: state
+    type(error_list_t), intent(inout) :: errors
+
+    call read_dataset(file, '/state/displacement', state%displacement, errors)
+    call read_dataset(file, '/state/velocity', state%velocity, errors)
+    call read_dataset(file, '/state/force', state%force, errors)
+    call read_dataset(file, '/state/deformation_gradient', state%deformation_gradient, errors)
+    call read_dataset(file, '/state/stress', state%stress, errors)
+    call read_dataset(file, '/state/plastic_strain', state%plastic_strain, errors)
+    call read_dataset(file, '/state/back_stress', state%back_stress, errors)
+    call read_dataset(file, '/state/alpha', state%alpha, errors)
+  end subroutine read_state
+
+  !> Whether a file begins with the head that belongs to the rest of it.
+  logical function is_whole(path)
+    character(*), intent(in) :: path
+    character(head_length) :: found
+    integer :: unit, status
+
+    is_whole = .false.
+    open (newunit=unit, file=path, status='old', action='read', access='stream', iostat=status)
+    if (status /= 0) return
+    read (unit, iostat=status) found
+    close (unit)
+    if (status == 0) is_whole = found == head(path)
+  end function is_whole
+
+  !> What the first bytes of a checkpoint should be, by the bytes that follow.
+  function head(path)
+    character(*), intent(in) :: path
+    character(head_length) :: head
+    integer(i8) :: size_found, total
+
+    call sum_bytes(path, size_found, total)
+    write (head, '(a, i20, z20.16)') schema, size_found, total
+    head(head_length:) = new_line('a')
+  end function head
+
+  !> Fletcher's sum of the 32-bit words behind the head; size -1 where the file cannot be read.
+  subroutine sum_bytes(path, size_found, total)
+    character(*), intent(in)  :: path
+    integer(i8),  intent(out) :: size_found, total
+    integer, parameter :: block_length = 65536
+    integer(i8), parameter :: modulus = 2_i8**31 - 1, low_bits = 2_i8**32 - 1
+    integer(int32), allocatable :: words(:)
+    integer(int8) :: rest(4)
+    integer(i8)   :: left, simple, weighted
+    integer :: unit, status, n, i
+
+    size_found = -1
+    total = 0
+    open (newunit=unit, file=path, status='old', action='read', access='stream', iostat=status)
+    if (status /= 0) return
+    inquire (unit, size=size_found)
+    left = size_found - head_length
+    simple = 1
+    weighted = 0
+    allocate (words(block_length))
+    do while (left > 0 .and. status == 0)
+      n = int(min(left / 4, int(block_length, i8)))
+      if (n > 0) then
+        read (unit, pos=size_found - left + 1, iostat=status) words(:n)
+      else
+        n = 1
+        rest = 0_int8
+        read (unit, pos=size_found - left + 1, iostat=status) rest(:left)
+        words(1) = transfer(rest, words(1))
+      end if
+      do i = 1, n
+        simple = modulo(simple + iand(int(words(i), i8), low_bits), modulus)
+        weighted = modulo(weighted + simple, modulus)
+      end do
+      left = left - 4_i8 * n
+    end do
+    close (unit)
+    total = ior(ishft(weighted, 32), simple)
+    if (status /= 0) size_found = -1
+  end subroutine sum_bytes
+
+  pure function newest(stem) result(path)
+    character(*), intent(in) :: stem
+    character(:), allocatable :: path
+
+    path = stem//'_checkpoint.h5'
+  end function newest
+
+  pure function previous(stem) result(path)
+    character(*), intent(in) :: stem
+    character(:), allocatable :: path
+
+    path = stem//'_checkpoint_previous.h5'
+  end function previous
+
+end module pd_checkpoint

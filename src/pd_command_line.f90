@@ -1,0 +1,169 @@
+!> The command line: options, their help, and what was asked for.
+module pd_command_line
+  use, intrinsic :: iso_fortran_env, only: output_unit
+  use pd_errors, only: error_list_t
+  use pd_text, only: nearest_name
+  implicit none
+  private
+
+  public :: options_t, read_command_line, print_help
+
+  !> What the user asked for.
+  type :: options_t
+    character(:), allocatable :: input_path
+    character(:), allocatable :: output_dir   !! '': as in the input
+    integer :: threads = 0                    !! 0: as OMP_NUM_THREADS says
+    logical :: check = .false., restart = .false., force = .false., quiet = .false.
+    logical :: version = .false., help = .false., input_reference = .false.
+  end type options_t
+
+contains
+
+  !> Read the options.
+  !>
+  !> Errors: an unknown option (the nearest right one is named), a missing or surplus argument,
+  !> options that exclude each other.
+  subroutine read_command_line(options, errors)
+    type(options_t),    intent(out)   :: options
+    type(error_list_t), intent(inout) :: errors
+    character(:), allocatable :: word
+    integer :: i
+
+    options%input_path = ''
+    options%output_dir = ''
+    i = 0
+    do while (i < command_argument_count())
+      i = i + 1
+      word = argument(i)
+      select case (word)
+      case ('--check')
+        options%check = .true.
+      case ('--restart')
+        options%restart = .true.
+      case ('--force')
+        options%force = .true.
+      case ('--quiet')
+        options%quiet = .true.
+      case ('--version')
+        options%version = .true.
+      case ('--help', '-h')
+        options%help = .true.
+      case ('--input-reference')
+        options%input_reference = .true.
+      case ('--output')
+        call value_of('--output', 'a folder', options%output_dir)
+      case ('--threads')
+        call read_threads(options%threads)
+      case default
+        call take_input_path(word, options, errors)
+      end select
+    end do
+    if (options%version .or. options%help .or. options%input_reference) return
+    if (options%input_path == '' .and. errors%count() == 0) &
+      call errors%add('no input file is given; perigeo --help shows how')
+    if (options%restart .and. options%force) call errors%add('--restart goes on with the '// &
+      'results of an earlier run, --force overwrites them: use one of them')
+
+  contains
+
+    !> The argument that follows an option.
+    subroutine value_of(option, meaning, value)
+      character(*),              intent(in)    :: option, meaning
+      character(:), allocatable, intent(inout) :: value
+
+      i = i + 1
+      value = ''
+      if (i <= command_argument_count()) value = argument(i)
+      if (value == '' .or. index(value, '--') == 1) &
+        call errors%add('a value is missing', option, '"'//value//'"', meaning)
+    end subroutine value_of
+
+    subroutine read_threads(threads)
+      integer, intent(out) :: threads
+      integer, parameter   :: most_threads = 4096
+      character(:), allocatable :: value
+      integer :: status
+
+      threads = 0
+      call value_of('--threads', 'a whole number', value)
+      if (value == '') return
+      status = 1
+      if (verify(value, '0123456789') == 0 .and. len(value) < 9) &
+        read (value, *, iostat=status) threads
+      if (status /= 0 .or. threads < 1 .or. threads > most_threads) &
+        call errors%add('the number of threads is wrong', '--threads', '"'//value//'"', '1 to 4096')
+    end subroutine read_threads
+
+  end subroutine read_command_line
+
+  !> A word that is no option is the input file.
+  subroutine take_input_path(word, options, errors)
+    character(*),       intent(in)    :: word
+    type(options_t),    intent(inout) :: options
+    type(error_list_t), intent(inout) :: errors
+    character(17), parameter :: known(9) = [character(17) :: '--check', '--output', '--threads', &
+      '--restart', '--force', '--quiet', '--version', '--help', '--input-reference']
+    character(:), allocatable :: near
+
+    if (index(word, '-') == 1) then
+      near = nearest_name(word, known)
+      if (near /= '') near = '; did you mean '//near//'?'
+      call errors%add('unknown option '//word//near)
+    else if (options%input_path /= '') then
+      call errors%add('more than one input file is given: '//options%input_path//' and '//word)
+    else
+      options%input_path = word
+    end if
+  end subroutine take_input_path
+
+  !> Argument i in its whole length.
+  function argument(i) result(word)
+    integer, intent(in) :: i
+    character(:), allocatable :: word
+    integer :: length
+
+    call get_command_argument(i, length=length)
+    allocate (character(length) :: word)
+    if (length > 0) call get_command_argument(i, word)
+  end function argument
+
+  !> The text of --help.
+  subroutine print_help()
+    character(*), parameter :: text(*) = [character(96) :: &
+      'perigeo: peridynamics for geomaterials. Shows where soil fails: plane strain, J2 plasticity', &
+      'with softening, non-ordinary state-based peridynamics.', &
+      '', &
+      'usage: perigeo [options] RUN.nml', &
+      '', &
+      '  RUN.nml             the input file, Fortran namelists: see doc/input.md and input/', &
+      '', &
+      '  --check             check the input and print the derived figures; run nothing', &
+      '  --output DIR        folder for the results (default: output_dir of the input file,', &
+      '                      or results/<name>)', &
+      '  --threads N         number of threads (default: OMP_NUM_THREADS, or all cores)', &
+      '  --restart           go on from the newest checkpoint in the output folder', &
+      '  --force             overwrite the results of an earlier run', &
+      '  --quiet             no progress on the screen; errors still appear', &
+      '  --input-reference   print the reference of all input keys (doc/input.md)', &
+      '  --version, --help', &
+      '', &
+      'Results, in the output folder: <name>_history.csv (curves), <name>.h5 (fields),', &
+      '<name>.xdmf (open this in ParaView), <name>.log. Figures: perigeo-post --help', &
+      '', &
+      'A first run:', &
+      '  bin/perigeo input/compression_quick.nml', &
+      '  .venv/bin/perigeo-post contours results/compression_quick/compression_quick.h5', &
+      '', &
+      'Ctrl-C (or SIGTERM) writes a checkpoint and stops; --restart goes on from there.', &
+      '', &
+      'exit status: 0 finished; 1 wrong command line; 2 wrong input file; 3 the model cannot be', &
+      '  set up; 4 the calculation failed; 5 a file cannot be written or read (also: results of', &
+      '  an earlier run in the way, no checkpoint to restart from); 130, 143 stopped by a signal']
+    integer :: i
+
+    do i = 1, size(text)
+      write (output_unit, '(a)') trim(text(i))
+    end do
+  end subroutine print_help
+
+end module pd_command_line

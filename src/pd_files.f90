@@ -1,0 +1,210 @@
+!> Text files and folders, through the C library.
+!>
+!> Not through Fortran's own units: the run-time library of gfortran keeps the errors of FLUSH and
+!> CLOSE to itself, so that a full disk goes unnoticed. Every return code is checked here.
+module pd_files
+  use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_int, c_null_char, c_null_ptr, &
+    c_ptr, c_size_t
+  use pd_errors, only: error_list_t
+  use pd_system, only: make_directories, remove_file, rename_file
+  implicit none
+  private
+
+  public :: output_file_t, open_output, write_line, flush_output, close_output
+  public :: replace_file, sync_file, patch_file, write_whole_file, prepare_folder, file_exists
+
+  !> A text file that is being written. After the first failure nothing more is written to it and
+  !> nothing more is reported.
+  type :: output_file_t
+    private
+    type(c_ptr) :: stream = c_null_ptr
+    character(:), allocatable :: path
+    logical :: failed = .false.
+  contains
+    procedure :: is_open
+  end type output_file_t
+
+  interface
+    type(c_ptr) function c_fopen(path, mode) bind(c, name='fopen')
+      import :: c_char, c_ptr
+      character(kind=c_char), intent(in) :: path(*), mode(*)
+    end function c_fopen
+    integer(c_size_t) function c_fwrite(text, item, count, stream) bind(c, name='fwrite')
+      import :: c_char, c_ptr, c_size_t
+      character(kind=c_char), intent(in) :: text(*)
+      integer(c_size_t), value :: item, count
+      type(c_ptr), value :: stream
+    end function c_fwrite
+    integer(c_int) function c_fflush(stream) bind(c, name='fflush')
+      import :: c_int, c_ptr
+      type(c_ptr), value :: stream
+    end function c_fflush
+    integer(c_int) function c_fclose(stream) bind(c, name='fclose')
+      import :: c_int, c_ptr
+      type(c_ptr), value :: stream
+    end function c_fclose
+    integer(c_int) function c_fileno(stream) bind(c, name='fileno')
+      import :: c_int, c_ptr
+      type(c_ptr), value :: stream
+    end function c_fileno
+    integer(c_int) function c_fsync(descriptor) bind(c, name='fsync')
+      import :: c_int
+      integer(c_int), value :: descriptor
+    end function c_fsync
+  end interface
+
+contains
+
+  !> Whether the file is open and everything so far has been written.
+  pure logical function is_open(self)
+    class(output_file_t), intent(in) :: self
+
+    is_open = c_associated(self%stream) .and. .not. self%failed
+  end function is_open
+
+  !> Open a text file: anew, or with `append` behind what it holds.
+  !>
+  !> Errors: the file cannot be created or opened.
+  subroutine open_output(file, path, append, errors)
+    type(output_file_t), intent(out)   :: file
+    character(*),        intent(in)    :: path
+    logical,             intent(in)    :: append
+    type(error_list_t),  intent(inout) :: errors
+
+    file%path = path
+    if (append) then
+      file%stream = c_fopen(path//c_null_char, 'ab'//c_null_char)
+    else
+      file%stream = c_fopen(path//c_null_char, 'wb'//c_null_char)
+    end if
+    if (c_associated(file%stream)) return
+    file%failed = .true.
+    call errors%add('cannot be opened for writing: is the folder there, is writing permitted, ' &
+      //'is the disk full?', where=path)
+  end subroutine open_output
+
+  !> Write one line. It reaches the operating system with `flush_output` at the latest.
+  subroutine write_line(file, text, errors)
+    type(output_file_t), intent(inout) :: file
+    character(*),        intent(in)    :: text
+    type(error_list_t),  intent(inout) :: errors
+    integer(c_size_t) :: length
+
+    if (.not. file%is_open()) return
+    length = len(text, c_size_t) + 1_c_size_t
+    if (c_fwrite(text//new_line('a'), 1_c_size_t, length, file%stream) /= length) then
+      call report_write(file, errors)
+    end if
+  end subroutine write_line
+
+  !> Hand everything written so far to the operating system.
+  subroutine flush_output(file, errors)
+    type(output_file_t), intent(inout) :: file
+    type(error_list_t),  intent(inout) :: errors
+
+    if (.not. file%is_open()) return
+    if (c_fflush(file%stream) /= 0) call report_write(file, errors)
+  end subroutine flush_output
+
+  !> Close the file; harmless where it is not open.
+  subroutine close_output(file, errors)
+    type(output_file_t), intent(inout) :: file
+    type(error_list_t),  intent(inout) :: errors
+    integer(c_int) :: status
+
+    if (.not. c_associated(file%stream)) return
+    status = c_fclose(file%stream)
+    file%stream = c_null_ptr
+    if (status /= 0 .and. .not. file%failed) call report_write(file, errors)
+  end subroutine close_output
+
+  subroutine report_write(file, errors)
+    type(output_file_t), intent(inout) :: file
+    type(error_list_t),  intent(inout) :: errors
+
+    file%failed = .true.
+    call errors%add('cannot be written to: is the disk full?', where=file%path)
+  end subroutine report_write
+
+  !> Put `temporary` in the place of `path` in one step: a reader sees the old file or the new one.
+  !> Where that fails, `temporary` is removed.
+  subroutine replace_file(temporary, path, errors)
+    character(*),       intent(in)    :: temporary, path
+    type(error_list_t), intent(inout) :: errors
+    logical :: ignored
+
+    if (rename_file(temporary, path)) return
+    call errors%add('cannot be replaced: is it a folder, is writing permitted?', where=path)
+    ignored = remove_file(temporary)
+  end subroutine replace_file
+
+  !> Wait until the contents of a closed file are on the disk.
+  subroutine sync_file(path, errors)
+    character(*),       intent(in)    :: path
+    type(error_list_t), intent(inout) :: errors
+    type(c_ptr)    :: stream
+    integer(c_int) :: status, ignored
+
+    status = -1
+    stream = c_fopen(path//c_null_char, 'rb'//c_null_char)
+    if (c_associated(stream)) then
+      status = c_fsync(c_fileno(stream))
+      ignored = c_fclose(stream)
+    end if
+    if (status /= 0) call errors%add('did not reach the disk: is it full?', where=path)
+  end subroutine sync_file
+
+  !> Overwrite the first bytes of a file that exists.
+  subroutine patch_file(path, text, errors)
+    character(*),       intent(in)    :: path, text
+    type(error_list_t), intent(inout) :: errors
+    type(c_ptr) :: stream
+    logical     :: done
+    integer(c_size_t) :: length
+
+    done = .false.
+    length = len(text, c_size_t)
+    stream = c_fopen(path//c_null_char, 'r+b'//c_null_char)
+    if (c_associated(stream)) then
+      done = c_fwrite(text, 1_c_size_t, length, stream) == length
+      done = c_fclose(stream) == 0 .and. done
+    end if
+    if (.not. done) call errors%add('cannot be written to: is the disk full?', where=path)
+  end subroutine patch_file
+
+  !> Write a whole text file beside its final name and put it in place in one step.
+  subroutine write_whole_file(path, text, errors)
+    character(*),       intent(in)    :: path, text
+    type(error_list_t), intent(inout) :: errors
+    type(output_file_t) :: file
+    logical :: whole, ignored
+
+    call open_output(file, path//'.tmp', .false., errors)
+    call write_line(file, text, errors)
+    call flush_output(file, errors)
+    whole = file%is_open()
+    call close_output(file, errors)
+    if (whole .and. .not. file%failed) then
+      call replace_file(path//'.tmp', path, errors)
+    else
+      ignored = remove_file(path//'.tmp')
+    end if
+  end subroutine write_whole_file
+
+  !> See to it that a folder is there and can be written to.
+  subroutine prepare_folder(path, errors)
+    character(*),       intent(in)    :: path
+    type(error_list_t), intent(inout) :: errors
+
+    if (make_directories(path)) return
+    call errors%add('the output folder cannot be created or cannot be written to: is writing ' &
+      //'permitted, is a file of that name in the way?', where=path)
+  end subroutine prepare_folder
+
+  logical function file_exists(path)
+    character(*), intent(in) :: path
+
+    inquire (file=path, exist=file_exists)
+  end function file_exists
+
+end module pd_files

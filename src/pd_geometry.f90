@@ -1,0 +1,222 @@
+!> The body: reference points, their volumes, and the sets of fictitious points.
+!>
+!> Points come from rectangles on one lattice or from a cloud; both are fixed after set-up.
+!> Source: doc/theory.md, sections 1 and 7.
+module pd_geometry
+  use pd_errors, only: error_list_t
+  use pd_kinds, only: wp
+  implicit none
+  private
+
+  public :: body_t, lattice_t, layer_t, lattice_body, nearest_count
+
+  !> Reference points in the order of the rows of the lattice (y slow, x fast), or of the file.
+  type :: body_t
+    integer :: n = 0                            !! points, fictitious ones included
+    real(wp), allocatable :: position(:, :)     !! X (n,2) [m]
+    real(wp), allocatable :: volume(:)          !! V (n) per unit thickness [m^2]
+    integer,  allocatable :: boundary(:)        !! 0: body, k: fictitious point of boundary k (n)
+    real(wp) :: lower(2) = 0.0_wp               !! corners of the extent of the body without
+    real(wp) :: upper(2) = 0.0_wp               !! fictitious points, as used [m]
+  end type body_t
+
+  !> How rectangles become points.
+  type :: lattice_t
+    real(wp) :: spacing                         !! dx [m]
+    logical  :: cells                           !! points at cell centres, else on the boundary
+    logical  :: tributary                       !! each point owns its own part of the area
+    integer  :: rows                            !! thickness of fictitious layers in points
+  end type lattice_t
+
+  !> Fictitious points beyond one side.
+  type :: layer_t
+    character(:), allocatable :: side           !! 'bottom' | 'top' | 'left' | 'right' | 'all'
+    integer :: boundary                         !! index of the boundary they belong to
+  end type layer_t
+
+  !> Occupied places of a lattice in a box of columns and rows; index 0 is the lower left place
+  !> of the body.
+  type :: places_t
+    integer, allocatable :: owner(:, :)         !! void, or as body_t%boundary
+    logical, allocatable :: filled(:, :)        !! the square up and right of a node is material
+  end type places_t
+
+  integer, parameter :: void = -1
+
+contains
+
+  !> Number of spacings in a length, halves rounded up.
+  elemental integer function nearest_count(length, spacing)
+    real(wp), intent(in) :: length, spacing
+    real(wp), parameter  :: round_off = 1.0e-6_wp
+
+    nearest_count = floor(length / spacing + 0.5_wp + round_off)
+  end function nearest_count
+
+  !> Points of the union of rectangles on one lattice, with fictitious layers beyond its sides.
+  !>
+  !> The lattice starts at the lower left corner of the first rectangle; every corner moves to its
+  !> nearest line. Errors: a rectangle thinner than one spacing, a layer that holds no point.
+  subroutine lattice_body(lower, upper, lattice, layers, body, errors)
+    real(wp),        intent(in)    :: lower(:, :), upper(:, :)  !! corners (2, rectangles) [m]
+    type(lattice_t), intent(in)    :: lattice
+    type(layer_t),   intent(in)    :: layers(:)
+    type(body_t),    intent(out)   :: body
+    type(error_list_t), intent(inout) :: errors
+    type(places_t) :: places
+    integer  :: first(2, size(lower, 2)), last(2, size(lower, 2)), start(2), counts(2), k
+    real(wp) :: origin(2)
+
+    do k = 1, size(lower, 2)
+      first(:, k) = nearest_count(lower(:, k) - lower(:, 1), lattice%spacing)
+      last(:, k) = first(:, k) + nearest_count(upper(:, k) - lower(:, k), lattice%spacing)
+      if (any(last(:, k) <= first(:, k))) then
+        call errors%add('a body is thinner than one spacing', '&body')
+        return
+      end if
+    end do
+    start = minval(first, dim=2)
+    counts = maxval(last, dim=2) - start
+    origin = lower(:, 1) + real(start, wp) * lattice%spacing
+    body%lower = origin
+    body%upper = origin + real(counts, wp) * lattice%spacing
+
+    call fill_rectangles(first, last, start, counts, lattice, places)
+    do k = 1, size(layers)
+      call fill_layer(layers(k), layers, counts, lattice, places)
+      if (.not. any(places%owner == layers(k)%boundary)) then
+        call errors%add('a boundary holds no point', '&boundary side = '//layers(k)%side)
+      end if
+    end do
+    call number_points(places, origin, lattice, body)
+  end subroutine lattice_body
+
+  !> Mark the points and the squares of the rectangles.
+  subroutine fill_rectangles(first, last, start, counts, lattice, places)
+    integer,         intent(in)  :: first(:, :), last(:, :)  !! lattice lines (2, rectangles)
+    integer,         intent(in)  :: start(2), counts(2)
+    type(lattice_t), intent(in)  :: lattice
+    type(places_t),  intent(out) :: places
+    integer :: margin, a(2), b(2), k
+
+    margin = lattice%rows + 1
+    allocate (places%owner(-margin:counts(1) + margin, -margin:counts(2) + margin), source=void)
+    allocate (places%filled(-margin:counts(1) + margin, -margin:counts(2) + margin), &
+      source=.false.)
+    do k = 1, size(first, 2)
+      a = first(:, k) - start
+      b = last(:, k) - start - 1
+      places%filled(a(1):b(1), a(2):b(2)) = .true.
+      if (.not. lattice%cells) b = b + 1
+      places%owner(a(1):b(1), a(2):b(2)) = 0
+    end do
+  end subroutine fill_rectangles
+
+  !> Mark the fictitious points beyond a side: under (above, beside) every point of the outermost
+  !> row. Where layers of two sides meet, the corner block belongs to the bottom or top side.
+  !>
+  !> The squares go one row further than the points: the outermost row stands for a body that
+  !> goes on, so that its points own whole cells across the layer.
+  subroutine fill_layer(layer, layers, counts, lattice, places)
+    type(layer_t),   intent(in)    :: layer
+    type(layer_t),   intent(in)    :: layers(:)
+    integer,         intent(in)    :: counts(2)
+    type(lattice_t), intent(in)    :: lattice
+    type(places_t),  intent(inout) :: places
+    integer :: outer(2), i, p
+
+    p = lattice%rows
+    outer = merge(counts - 1, counts, lattice%cells)
+    associate (owner => places%owner, filled => places%filled)
+      if (on('left')) then
+        do i = 1, p + 1
+          if (i <= p) where (owner(0, 0:outer(2)) == 0) owner(-i, 0:outer(2)) = layer%boundary
+          filled(-i, 0:counts(2) - 1) = filled(0, 0:counts(2) - 1)
+        end do
+      end if
+      if (on('right')) then
+        do i = 1, p + 1
+          if (i <= p) where (owner(outer(1), 0:outer(2)) == 0) &
+            owner(outer(1) + i, 0:outer(2)) = layer%boundary
+          filled(counts(1) - 1 + i, 0:counts(2) - 1) = filled(counts(1) - 1, 0:counts(2) - 1)
+        end do
+      end if
+      if (on('bottom')) call fill_row(0, -1)
+      if (on('top')) call fill_row(outer(2), 1)
+    end associate
+
+  contains
+
+    !> Whether this layer lies on a side.
+    logical function on(side)
+      character(*), intent(in) :: side
+
+      on = layer%side == side .or. layer%side == 'all'
+    end function on
+
+    !> Whether any layer lies on a side.
+    logical function any_on(side)
+      character(*), intent(in) :: side
+      integer :: k
+
+      any_on = .false.
+      do k = 1, size(layers)
+        any_on = any_on .or. layers(k)%side == side .or. layers(k)%side == 'all'
+      end do
+    end function any_on
+
+    !> Layers beyond the points of row y, in direction step, corner blocks included.
+    subroutine fill_row(y, step)
+      integer, intent(in) :: y, step
+      integer :: from, to, square_row, k, columns(2)
+
+      square_row = merge(0, counts(2) - 1, step < 0)
+      columns = [0, outer(1)]
+      if (any_on('left') .and. places%owner(0, y) == 0) columns(1) = -p
+      if (any_on('right') .and. places%owner(outer(1), y) == 0) columns(2) = outer(1) + p
+      from = columns(1)
+      to = columns(2)
+      do k = 1, p + 1
+        if (k <= p) then
+          where (places%owner(0:outer(1), y) == 0) &
+            places%owner(0:outer(1), y + step * k) = layer%boundary
+          places%owner(from:-1, y + step * k) = layer%boundary
+          places%owner(outer(1) + 1:to, y + step * k) = layer%boundary
+        end if
+        places%filled(0:counts(1) - 1, square_row + step * k) = &
+          places%filled(0:counts(1) - 1, square_row)
+        if (from < 0) places%filled(-p - 1:-1, square_row + step * k) = .true.
+        if (to > outer(1)) places%filled(counts(1):counts(1) + p, square_row + step * k) = .true.
+      end do
+    end subroutine fill_row
+
+  end subroutine fill_layer
+
+  !> Number the occupied places row by row and give them positions and volumes.
+  subroutine number_points(places, origin, lattice, body)
+    type(places_t),  intent(in)    :: places
+    real(wp),        intent(in)    :: origin(2)
+    type(lattice_t), intent(in)    :: lattice
+    type(body_t),    intent(inout) :: body
+    integer  :: ix, iy, i, quarters
+    real(wp) :: offset
+
+    body%n = count(places%owner /= void)
+    allocate (body%position(body%n, 2), body%volume(body%n), body%boundary(body%n))
+    offset = merge(0.5_wp, 0.0_wp, lattice%cells)
+    i = 0
+    do iy = lbound(places%owner, 2), ubound(places%owner, 2)
+      do ix = lbound(places%owner, 1), ubound(places%owner, 1)
+        if (places%owner(ix, iy) == void) cycle
+        i = i + 1
+        body%position(i, :) = origin + (real([ix, iy], wp) + offset) * lattice%spacing
+        body%boundary(i) = places%owner(ix, iy)
+        quarters = 4
+        if (lattice%tributary .and. .not. lattice%cells) &
+          quarters = count(places%filled(ix - 1:ix, iy - 1:iy))
+        body%volume(i) = 0.25_wp * real(quarters, wp) * lattice%spacing**2
+      end do
+    end do
+  end subroutine number_points
+
+end module pd_geometry

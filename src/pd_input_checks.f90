@@ -1,0 +1,367 @@
+!> What several keys together must fulfil: points, bodies, material, weak patch, control.
+!>
+!> A key that is absent or damaged holds `unset` or an empty text here; its checks are passed over,
+!> because it has been complained about already.
+module pd_input_checks
+  use pd_errors, only: error_list_t
+  use pd_input_types, only: body_input_t, input_t
+  use pd_input_values, only: group_named, is_damaged, is_given
+  use pd_kinds, only: is_set, wp
+  use pd_namelist, only: max_problems, namelist_group_t, place_of
+  use pd_text, only: integer_text, number_text
+  implicit none
+  private
+
+  public :: check_model, resolved_path, is_cloud, add_missing, add_useless
+
+  real(wp), parameter :: lattice_tolerance = 1.0e-6_wp   !! of spacing
+  real(wp), parameter :: max_points = 1.0e8_wp
+  real(wp), parameter :: max_horizon = 100.0_wp          !! in units of spacing
+
+contains
+
+  !> All checks of this module.
+  subroutine check_model(input, groups, errors)
+    type(input_t),          intent(in)    :: input
+    type(namelist_group_t), intent(in)    :: groups(:)
+    type(error_list_t),     intent(inout) :: errors
+    integer :: k
+
+    call check_discretisation(input, group_named(groups, 'discretisation', 1, input%path), errors)
+    do k = 1, size(input%bodies)
+      if (errors%count() >= max_problems) return
+      call check_body(input, k, group_named(groups, 'body', k, input%path), errors)
+    end do
+    call check_number_of_points(input, groups, errors)
+    call check_material(input, group_named(groups, 'material', 1, input%path), errors)
+    call check_stabilisation(input, group_named(groups, 'stabilisation', 1, input%path), errors)
+    call check_imperfection(input, group_named(groups, 'imperfection', 1, input%path), errors)
+  end subroutine check_model
+
+  !> Whether the body is a point cloud.
+  pure logical function is_cloud(input)
+    type(input_t), intent(in) :: input
+    integer :: k
+
+    is_cloud = .false.
+    do k = 1, size(input%bodies)
+      if (input%bodies(k)%shape == 'file') is_cloud = .true.
+    end do
+  end function is_cloud
+
+  !> Path of a file that the input names: itself where it is absolute, else in the folder of the
+  !> input file, else, where it is not there, in the working directory.
+  function resolved_path(input, file) result(path)
+    type(input_t), intent(in) :: input
+    character(*),  intent(in) :: file
+    character(:), allocatable :: path
+    logical :: exists
+    integer :: slash
+
+    path = trim(file)
+    if (index(path, '/') == 1) return
+    slash = index(input%path, '/', back=.true.)
+    if (slash == 0) return
+    inquire (file=input%path(:slash)//path, exist=exists)
+    if (exists) path = input%path(:slash)//path
+  end function resolved_path
+
+  subroutine add_missing(group, key, why, errors)
+    type(namelist_group_t), intent(in)    :: group
+    character(*),           intent(in)    :: key, why
+    type(error_list_t),     intent(inout) :: errors
+
+    call errors%add('the key is missing, it is needed '//why, where=place_of(group, key))
+  end subroutine add_missing
+
+  !> A key that is given although it would be without effect.
+  subroutine add_useless(group, key, why, errors)
+    type(namelist_group_t), intent(in)    :: group
+    character(*),           intent(in)    :: key, why
+    type(error_list_t),     intent(inout) :: errors
+
+    if (is_given(group, key)) call errors%add('the key has no effect '//why, &
+                                              where=place_of(group, key), allowed='leave it out')
+  end subroutine add_useless
+
+  subroutine check_discretisation(input, group, errors)
+    type(input_t),          intent(in)    :: input
+    type(namelist_group_t), intent(in)    :: group
+    type(error_list_t),     intent(inout) :: errors
+    real(wp), parameter :: least_conical = 1.5_wp
+
+    if (is_cloud(input)) then
+      call add_useless(group, 'layout', 'on a point cloud', errors)
+      call add_useless(group, 'volumes', 'on a point cloud', errors)
+      call add_useless(group, 'fit', 'on a point cloud', errors)
+      return
+    end if
+    associate (d => input%discretisation)
+      if (.not. (is_set(d%spacing) .and. is_set(d%horizon))) return
+      if (d%horizon < d%spacing*(1.0_wp - lattice_tolerance)) then
+        call errors%add('the horizon is less than the spacing', &
+                        where=place_of(group, 'horizon'), found=number_text(d%horizon), &
+                        allowed='at least '//number_text(d%spacing)//' [m]')
+      else if (d%influence == 'conical' .and. &
+               d%horizon < least_conical*d%spacing*(1.0_wp - lattice_tolerance)) then
+        call errors%add('no bond carries weight: influence = ''conical'' needs a larger horizon', &
+                        where=place_of(group, 'horizon'), found=number_text(d%horizon), &
+                        allowed='at least '//number_text(least_conical*d%spacing)//' [m]')
+      else if (d%horizon > max_horizon*d%spacing) then
+        call errors%add('the horizon is more than 100 spacings', &
+                        where=place_of(group, 'horizon'), found=number_text(d%horizon), &
+                        allowed='at most '//number_text(max_horizon*d%spacing)//' [m]')
+      end if
+    end associate
+  end subroutine check_discretisation
+
+  !> Body k, whose group is `group`.
+  subroutine check_body(input, k, group, errors)
+    type(input_t),          intent(in)    :: input
+    integer,                intent(in)    :: k
+    type(namelist_group_t), intent(in)    :: group
+    type(error_list_t),     intent(inout) :: errors
+    character(*), parameter :: extents(4) = ['x_min', 'x_max', 'y_min', 'y_max']
+    integer :: i, n
+
+    n = 0
+    do i = 1, size(extents)
+      if (is_given(group, extents(i))) n = n + 1
+    end do
+    associate (b => input%bodies(k))
+      if (b%shape == 'rectangle') then
+        do i = 1, size(extents)
+          if (.not. is_given(group, extents(i))) call add_missing(group, extents(i), &
+                                                                  'for a rectangle', errors)
+        end do
+        call add_useless(group, 'file', 'on a rectangle', errors)
+      else if (b%shape == 'file') then
+        if (size(input%bodies) > 1) call errors%add('a point cloud beside another body', &
+          where=place_of(group, 'shape'), found=integer_text(size(input%bodies))//' bodies', &
+          allowed='rectangles only, or one point cloud alone')
+        if (n > 0 .and. n < size(extents)) call errors%add( &
+          'only some of the extents of a point cloud are given', where=place_of(group), &
+          found=integer_text(n), allowed='all of x_min, x_max, y_min, y_max, or none')
+        call check_file(input, b%file, group, errors)
+      end if
+      call check_extent('x', b%x_min, b%x_max)
+      call check_extent('y', b%y_min, b%y_max)
+    end associate
+
+  contains
+
+    subroutine check_extent(axis, lower, upper)
+      character, intent(in) :: axis
+      real(wp),  intent(in) :: lower, upper
+
+      if (.not. (is_set(lower) .and. is_set(upper))) return
+      if (lower >= upper) then
+        call errors%add('the body has no extent along '//axis, &
+                        where=place_of(group, axis//'_max'), found=number_text(upper), &
+                        allowed='above '//axis//'_min = '//number_text(lower)//' [m]')
+      else if (input%bodies(k)%shape == 'rectangle') then
+        call check_fit(input, k, axis, group, errors)
+      end if
+    end subroutine check_extent
+
+  end subroutine check_body
+
+  subroutine check_file(input, file, group, errors)
+    type(input_t),          intent(in)    :: input
+    character(*),           intent(in)    :: file
+    type(namelist_group_t), intent(in)    :: group
+    type(error_list_t),     intent(inout) :: errors
+    logical :: exists, is_folder
+
+    if (.not. is_given(group, 'file')) then
+      call add_missing(group, 'file', 'for shape = ''file''', errors)
+    else if (file /= '') then
+      inquire (file=resolved_path(input, file), exist=exists)
+      inquire (file=resolved_path(input, file)//'/.', exist=is_folder)
+      if (.not. exists .or. is_folder) call errors%add('the file does not exist', &
+        where=place_of(group, 'file'), found=''''//file//'''', &
+        allowed='a file in the folder of the input file or in the working directory')
+    end if
+  end subroutine check_file
+
+  !> Whether body k fits on the lattice along an axis: its extent, and its offset from the first
+  !> body, are whole multiples of spacing. With fit = 'nearest' the set-up adjusts them.
+  subroutine check_fit(input, k, axis, group, errors)
+    type(input_t),          intent(in)    :: input
+    integer,                intent(in)    :: k
+    character,              intent(in)    :: axis
+    type(namelist_group_t), intent(in)    :: group
+    type(error_list_t),     intent(inout) :: errors
+    real(wp) :: extent, first, fits, lower, spacing, steps
+
+    spacing = input%discretisation%spacing
+    if (.not. is_set(spacing)) return
+    lower = merge(input%bodies(k)%x_min, input%bodies(k)%y_min, axis == 'x')
+    extent = merge(input%bodies(k)%x_max, input%bodies(k)%y_max, axis == 'x') - lower
+    steps = extent/spacing
+    if (steps < 0.5_wp) then
+      call errors%add('the extent along '//axis//' is less than half a spacing', &
+                      where=place_of(group, axis//'_max'), found=number_text(extent), &
+                      allowed='at least spacing = '//number_text(spacing)//' [m]')
+      return
+    end if
+    if (input%discretisation%fit /= 'exact') return
+    fits = max(1.0_wp, anint(steps))
+    if (abs(steps - fits) > lattice_tolerance) then
+      call errors%add('the extent along '//axis//' is not a multiple of spacing', &
+                      where=place_of(group, axis//'_max'), found=number_text(rounded(extent)), &
+                      allowed=neighbours(steps, spacing)//', or fit = ''nearest''')
+    end if
+    first = merge(input%bodies(1)%x_min, input%bodies(1)%y_min, axis == 'x')
+    if (k == 1 .or. .not. is_set(first)) return
+    steps = (lower - first)/spacing
+    if (abs(steps - anint(steps)) > lattice_tolerance) call errors%add( &
+      'the body is not on the lattice of the first body along '//axis, &
+      where=place_of(group, axis//'_min'), found=number_text(lower), &
+      allowed=number_text(rounded(first + anint(steps)*spacing))//', or fit = ''nearest''')
+  end subroutine check_fit
+
+  !> The multiples of spacing below and above an extent of so many steps, for a message.
+  pure function neighbours(steps, spacing) result(text)
+    real(wp), intent(in) :: steps, spacing
+    character(:), allocatable :: text
+    real(wp) :: below
+
+    below = aint(steps)
+    text = number_text(rounded((below + 1.0_wp)*spacing))//' [m]'
+    if (below > 0.0_wp) text = number_text(rounded(below*spacing))//' or '//text
+    text = 'nearest '//text
+  end function neighbours
+
+  !> The number to ten digits: differences and products carry round-off that messages should not.
+  pure real(wp) function rounded(x)
+    real(wp), intent(in) :: x
+    character(20) :: buffer
+
+    write (buffer, '(es20.9e3)') x
+    read (buffer, '(f20.0)') rounded
+  end function rounded
+
+  subroutine check_number_of_points(input, groups, errors)
+    type(input_t),          intent(in)    :: input
+    type(namelist_group_t), intent(in)    :: groups(:)
+    type(error_list_t),     intent(inout) :: errors
+    real(wp) :: points
+    integer  :: k
+
+    if (.not. is_set(input%discretisation%spacing)) return
+    points = 0.0_wp
+    do k = 1, size(input%bodies)
+      points = points + points_of(input%bodies(k), input%discretisation%spacing)
+    end do
+    if (points > max_points) call errors%add('the bodies would have too many points', &
+      where=place_of(group_named(groups, 'discretisation', 1, input%path), 'spacing'), &
+      found='about '//number_text(rounded(points)), allowed='at most 1e8')
+  end subroutine check_number_of_points
+
+  !> About how many points a rectangle has; 0 for anything else.
+  pure real(wp) function points_of(body, spacing)
+    type(body_input_t), intent(in) :: body
+    real(wp),           intent(in) :: spacing
+
+    points_of = 0.0_wp
+    if (body%shape /= 'rectangle') return
+    if (.not. (is_set(body%x_min) .and. is_set(body%x_max) .and. is_set(body%y_min) &
+               .and. is_set(body%y_max))) return
+    if (body%x_max <= body%x_min .or. body%y_max <= body%y_min) return
+    ! Bounded first: the plain product can overflow.
+    points_of = min(1.0e20_wp, (body%x_max - body%x_min)/spacing + 1.0_wp) &
+      *min(1.0e20_wp, (body%y_max - body%y_min)/spacing + 1.0_wp)
+  end function points_of
+
+  subroutine check_material(input, group, errors)
+    type(input_t),          intent(in)    :: input
+    type(namelist_group_t), intent(in)    :: group
+    type(error_list_t),     intent(inout) :: errors
+    real(wp) :: h_i, h_k, three_g
+
+    ! Plasticity keys are left alone with 'elastic', so that one word switches the model.
+    if (input%material%model /= 'j2') return
+    associate (m => input%material)
+      if (.not. is_given(group, 'yield_stress')) &
+        call add_missing(group, 'yield_stress', 'for model = ''j2''', errors)
+      if (is_set(m%residual_strength) .and. is_set(m%yield_stress)) then
+        if (m%residual_strength > m%yield_stress) call errors%add( &
+          'the residual strength is above the yield stress', &
+          where=place_of(group, 'residual_strength'), found=number_text(m%residual_strength), &
+          allowed='0 to yield_stress = '//number_text(m%yield_stress)//' [Pa]')
+      end if
+      h_k = m%kinematic_modulus
+      h_i = m%isotropic_modulus
+      if (.not. (is_set(h_k) .and. is_set(h_i))) return
+      if (min(h_k, h_i) < 0.0_wp .and. .not. is_given(group, 'residual_strength')) &
+        call add_missing(group, 'residual_strength', 'where a modulus is negative', errors)
+      if (.not. (is_set(m%youngs_modulus) .and. is_set(m%poissons_ratio))) return
+      three_g = 1.5_wp*m%youngs_modulus/(1.0_wp + m%poissons_ratio)
+      if (three_g + h_k + h_i <= 0.0_wp) then
+        call errors%add('the material softens more steeply than it can unload', &
+          where=place_of(group, steeper_key(h_k, h_i)), found='H_k + H_i = ' &
+          //number_text(h_k + h_i), allowed='above -3 G = '//number_text(-three_g)//' [Pa]')
+      else if (max(h_k, h_i) < 0.0_wp .and. three_g + h_i + min(h_k, h_i) <= 0.0_wp) then
+        call errors%add('the material softens more steeply than it can unload', &
+          where=place_of(group, steeper_key(h_k, h_i)), found='H_i + min(H_k, H_i) = ' &
+          //number_text(h_i + min(h_k, h_i)), &
+          allowed='above -3 G = '//number_text(-three_g)//' [Pa]')
+      end if
+    end associate
+  end subroutine check_material
+
+  pure function steeper_key(h_k, h_i) result(key)
+    real(wp), intent(in) :: h_k, h_i
+    character(:), allocatable :: key
+
+    key = 'kinematic_modulus'
+    if (h_i < h_k) key = 'isotropic_modulus'
+  end function steeper_key
+
+  subroutine check_stabilisation(input, group, errors)
+    type(input_t),          intent(in)    :: input
+    type(namelist_group_t), intent(in)    :: group
+    type(error_list_t),     intent(inout) :: errors
+
+    if (is_damaged(group, 'factor')) return
+    associate (s => input%stabilisation)
+      if (s%method == 'silling' .and. s%factor <= 0.0_wp) then
+        call errors%add('the control has no strength', where=place_of(group, 'factor'), &
+                        found=number_text(s%factor), allowed='> 0 for method = ''silling''')
+      else if (s%method == 'none' .and. s%factor > 0.0_wp) then
+        call errors%add('a strength without control', where=place_of(group, 'factor'), &
+                        found=number_text(s%factor), allowed='0 for method = ''none''')
+      end if
+    end associate
+  end subroutine check_stabilisation
+
+  subroutine check_imperfection(input, group, errors)
+    type(input_t),          intent(in)    :: input
+    type(namelist_group_t), intent(in)    :: group
+    type(error_list_t),     intent(inout) :: errors
+    real(wp) :: weakest
+
+    associate (p => input%imperfection, m => input%material)
+      if (.not. is_set(p%amplitude)) return
+      if (p%amplitude <= 0.0_wp) return
+      if (.not. is_given(group, 'x')) call add_missing(group, 'x', 'for a weak patch', errors)
+      if (.not. is_given(group, 'y')) call add_missing(group, 'y', 'for a weak patch', errors)
+      if (.not. is_given(group, 'radius')) then
+        call add_missing(group, 'radius', 'for a weak patch', errors)
+      else if (is_set(p%radius) .and. p%radius <= 0.0_wp) then
+        call errors%add('the weak patch has no extent', where=place_of(group, 'radius'), &
+                        found=number_text(p%radius), allowed='> 0 where amplitude is above 0 [m]')
+      end if
+      if (m%model /= 'j2') return
+      if (.not. (is_set(m%yield_stress) .and. is_set(m%residual_strength))) return
+      weakest = (1.0_wp - p%amplitude)*m%yield_stress
+      if (m%residual_strength <= m%yield_stress .and. weakest < m%residual_strength) &
+        call errors%add('the weak patch is weaker than residual_strength', &
+          where=place_of(group, 'amplitude'), found=number_text(p%amplitude), &
+          allowed='(1 - amplitude) yield_stress at least '//number_text(m%residual_strength) &
+          //' [Pa]')
+    end associate
+  end subroutine check_imperfection
+
+end module pd_input_checks

@@ -1,0 +1,30 @@
+!> Working precision and the constants that everything shares.
+module pd_kinds
+  use, intrinsic :: iso_fortran_env, only: int64, real64
+  implicit none
+  private
+
+  public :: wp, i8, pi, unset, is_set, n_block
+
+  integer, parameter :: wp = real64
+  integer, parameter :: i8 = int64
+
+  real(wp), parameter :: pi = acos(-1.0_wp)
+
+  !> A number that the user has not given. Not a NaN: that would trap in the checking build.
+  real(wp), parameter :: unset = -huge(1.0_wp)
+
+  !> Points are worked on in blocks of this many, whatever the number of threads: every sum is
+  !> taken over a block and then over the blocks in order, so the bits do not depend on threads.
+  integer, parameter :: n_block = 512
+
+contains
+
+  !> Whether a number was given.
+  elemental logical function is_set(x)
+    real(wp), intent(in) :: x
+
+    is_set = x > 0.5_wp * unset
+  end function is_set
+
+end module pd_kinds

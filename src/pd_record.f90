@@ -1,0 +1,326 @@
+!> What a run writes: rows, frames, checkpoints and progress, from the model and its state.
+!>
+!> The only module that knows both the physics and the output.
+module pd_record
+  use, intrinsic :: iso_fortran_env, only: compiler_version
+  use pd_boundary, only: nominal_strain
+  use pd_checkpoint, only: checkpoint_exists, checkpoint_t, read_checkpoint, remove_checkpoints, &
+    write_checkpoint
+  use pd_errors, only: error_list_t
+  use pd_files, only: prepare_folder
+  use pd_geometry, only: body_t
+  use pd_history, only: close_history, create_history, history_row_t, history_t, resume_history, &
+    write_row
+  use pd_input, only: compare_used, used_values
+  use pd_input_types, only: input_t
+  use pd_kinds, only: wp
+  use pd_observe, only: ledger_t, observation_t, observe, point_fields
+  use pd_progress, only: close_progress, open_progress, progress_t, say, show_progress, status_t
+  use pd_result, only: create_result, finish_result, frame_fields_t, provenance_t, &
+    result_exists, result_t, resume_result, run_description_t, write_failed_frame, write_frame
+  use pd_schedule, only: schedule_t
+  use pd_setup, only: model_t
+  use pd_state, only: state_t
+  use pd_version, only: build_flags, code_version, git_hash
+  implicit none
+  private
+
+  public :: record_t, results_in_the_way, open_record, close_record, record_row, record_frame
+  public :: record_failure, record_progress, record_line
+  public :: save_checkpoint, load_checkpoint, same_points
+
+  !> The open outputs of a run.
+  type :: record_t
+    character(:), allocatable :: stem            !! output folder and name of the run
+    character(:), allocatable :: values(:)       !! 'group.key = value' of the input as used
+    type(result_t)      :: result
+    type(history_t)     :: history
+    type(progress_t)    :: progress
+    type(observation_t) :: seen                  !! of the last row
+    integer :: frames = 0                        !! written so far, 000000 among them
+  end type record_t
+
+  character(*), parameter :: ledger_names(5) = [character(24) :: 'initial_kinetic_energy', &
+    'plastic_dissipation', 'damping_dissipation', 'external_work', 'largest_work']
+
+contains
+
+  !> Whether an earlier run left results or checkpoints under this stem.
+  logical function results_in_the_way(stem)
+    character(*), intent(in) :: stem   !! output folder and name of the run
+
+    results_in_the_way = result_exists(stem)
+    if (.not. results_in_the_way) results_in_the_way = checkpoint_exists(stem)
+  end function results_in_the_way
+
+  !> Open all outputs: anew, or behind a checkpoint (`step` > 0 or rows in the history).
+  !>
+  !> Errors: a file cannot be written; on a restart, results that do not fit the checkpoint.
+  subroutine open_record(input, command, threads, model, schedule, checkpoint, quiet, record, &
+    errors)
+    type(input_t),      intent(in)    :: input
+    character(*),       intent(in)    :: command      !! the command line
+    integer,            intent(in)    :: threads
+    type(model_t),      intent(in)    :: model
+    type(schedule_t),   intent(in)    :: schedule
+    type(checkpoint_t), intent(in)    :: checkpoint   !! history_rows 0: a new run
+    logical,            intent(in)    :: quiet
+    type(record_t),     intent(out)   :: record
+    type(error_list_t), intent(inout) :: errors
+    type(run_description_t) :: description
+    logical :: platens, restart
+    integer :: n_new
+
+    record%stem = input%run%output_dir//'/'//input%run%name
+    record%values = used_values(input)
+    restart = checkpoint%history_rows > 0
+    platens = model%platens%axis > 0
+    call describe_run(input, command, threads, model, schedule, description)
+    description%values = record%values
+    call prepare_folder(input%run%output_dir, errors)
+    if (errors%count() > 0) return
+    if (restart) then
+      n_new = count(schedule%frame_steps > checkpoint%step)
+      call resume_result(record%result, record%stem, description, checkpoint%frames_written, &
+        n_new, checkpoint%step, errors)
+      if (errors%count() == 0) call resume_history(record%history, record%stem, &
+        description%boundary_names, platens, checkpoint%history_rows, errors)
+      record%frames = checkpoint%frames_written
+    else
+      ! the old checkpoints go last: until the new result is there a full disk must cost nothing
+      call create_result(record%result, record%stem, description, &
+        size(schedule%frame_steps) + 1, errors)
+      if (errors%count() == 0) call remove_checkpoints(record%stem, errors)
+      if (errors%count() == 0) call create_history(record%history, record%stem, &
+        description%boundary_names, platens, errors)
+    end if
+    if (errors%count() == 0) &
+      call open_progress(record%progress, record%stem, restart, quiet, errors)
+  end subroutine open_record
+
+  !> Everything that the result file says beside its frames.
+  subroutine describe_run(input, command, threads, model, schedule, description)
+    type(input_t),    intent(in) :: input
+    character(*),     intent(in) :: command
+    integer,          intent(in) :: threads
+    type(model_t),    intent(in) :: model
+    type(schedule_t), intent(in) :: schedule
+    type(run_description_t), intent(out) :: description
+    character(1), parameter :: axes(2) = ['x', 'y']
+    integer :: k
+
+    description%provenance = provenance_t(code_version, git_hash, compiler_version(), &
+      build_flags, command, threads)
+    description%title = input%run%title
+    description%name = input%run%name
+    description%namelist = input%text
+    description%strain_axis = 'none'
+    if (model%platens%axis > 0) description%strain_axis = axes(model%platens%axis)
+    description%spacing = model%spacing
+    description%horizon = model%delta
+    description%lower = model%body%lower
+    description%upper = model%body%upper
+    description%time_step = schedule%time_step
+    description%steps = schedule%steps
+    description%position = model%body%position
+    description%volume = model%body%volume
+    description%boundary = model%body%boundary
+    allocate (character(64) :: description%boundary_names(size(model%boundaries)))
+    do k = 1, size(model%boundaries)
+      description%boundary_names(k) = model%boundaries(k)%name
+    end do
+  end subroutine describe_run
+
+  !> Close all outputs of a run that has come to its end.
+  subroutine close_record(record, errors)
+    type(record_t),     intent(inout) :: record
+    type(error_list_t), intent(inout) :: errors
+
+    call close_history(record%history, errors)
+    if (errors%count() == 0) call finish_result(record%result, errors)
+    call close_progress(record%progress, errors)
+  end subroutine close_record
+
+  !> Observe the state and write a row of the history.
+  subroutine record_row(model, state, ledger, step, record, errors)
+    type(model_t),      intent(in)    :: model
+    type(state_t),      intent(in)    :: state
+    type(ledger_t),     intent(in)    :: ledger
+    integer,            intent(in)    :: step
+    type(record_t),     intent(inout) :: record
+    type(error_list_t), intent(inout) :: errors
+    type(history_row_t) :: row
+    integer :: k
+
+    call observe(model%body, model%solid, model%operators, state, ledger, record%seen)
+    row%step = step
+    row%time = real(step, wp) * model%motion%time_step
+    row%strain = strain_at(model, row%time)
+    allocate (row%force(size(model%boundaries), 2))
+    do k = 1, size(model%boundaries)
+      row%force(k, :) = model%boundaries(k)%force
+    end do
+    associate (seen => record%seen)
+      row%mean_stress_xx = seen%mean_stress_xx
+      row%mean_stress_yy = seen%mean_stress_yy
+      row%mean_strain_yy = seen%mean_strain_yy
+      row%max_plastic_strain = seen%max_plastic_strain
+      row%kinetic_energy = seen%kinetic_energy
+      row%strain_energy = seen%strain_energy
+      row%plastic_dissipation = seen%plastic_dissipation
+      row%damping_dissipation = seen%damping_dissipation
+      row%stabilisation_energy = seen%stabilisation_energy
+      row%external_work = seen%external_work
+      row%energy_error = seen%energy_error
+    end associate
+    call write_row(record%history, row, errors)
+  end subroutine record_row
+
+  !> Nominal strain, 0 where there are no platens.
+  pure real(wp) function strain_at(model, time) result(strain)
+    type(model_t), intent(in) :: model
+    real(wp),      intent(in) :: time   !! [s]
+
+    strain = 0.0_wp
+    if (model%platens%axis > 0) strain = nominal_strain(model%platens, model%boundaries, time)
+  end function strain_at
+
+  !> Write the next frame.
+  subroutine record_frame(model, state, step, record, errors)
+    type(model_t),      intent(in)    :: model
+    type(state_t),      intent(in)    :: state
+    integer,            intent(in)    :: step
+    type(record_t),     intent(inout) :: record
+    type(error_list_t), intent(inout) :: errors
+    type(frame_fields_t) :: fields
+    real(wp) :: time
+
+    time = real(step, wp) * model%motion%time_step
+    call gather_fields(model, state, fields)
+    call write_frame(record%result, record%frames, step, time, strain_at(model, time), fields, &
+      errors)
+    record%frames = record%frames + 1
+  end subroutine record_frame
+
+  !> Write the state of a run that has failed, marked as not valid.
+  subroutine record_failure(model, state, step, record, errors)
+    type(model_t),      intent(in)    :: model
+    type(state_t),      intent(in)    :: state
+    integer,            intent(in)    :: step
+    type(record_t),     intent(inout) :: record
+    type(error_list_t), intent(inout) :: errors
+    type(frame_fields_t) :: fields
+    real(wp) :: time
+
+    time = real(step, wp) * model%motion%time_step
+    call gather_fields(model, state, fields)
+    call write_failed_frame(record%result, step, time, strain_at(model, time), fields, errors)
+  end subroutine record_failure
+
+  !> The fields of a frame.
+  subroutine gather_fields(model, state, fields)
+    type(model_t), intent(in) :: model
+    type(state_t), intent(in) :: state
+    type(frame_fields_t), intent(out) :: fields
+
+    allocate (fields%stress(model%body%n, 4), fields%strain(model%body%n, 4))
+    allocate (fields%von_mises(model%body%n), fields%zero_energy(model%body%n))
+    fields%displacement = state%displacement
+    fields%velocity = state%velocity
+    fields%plastic_strain = state%alpha
+    call point_fields(model%body, model%operators, state, model%delta, fields%stress, &
+      fields%strain, fields%von_mises, fields%zero_energy)
+  end subroutine gather_fields
+
+  !> Show where the run stands; axial stress and largest alpha are those of the last row.
+  subroutine record_progress(model, schedule, step, record, errors)
+    type(model_t),      intent(in)    :: model
+    type(schedule_t),   intent(in)    :: schedule
+    integer,            intent(in)    :: step
+    type(record_t),     intent(inout) :: record
+    type(error_list_t), intent(inout) :: errors
+    type(status_t) :: status
+
+    status%step = step
+    status%steps = schedule%steps
+    status%time = real(step, wp) * schedule%time_step
+    status%largest_alpha = record%seen%max_plastic_strain
+    if (model%platens%axis > 0) then
+      status%has_strain = .true.
+      status%strain = strain_at(model, status%time)
+      status%axial_stress = &
+        model%boundaries(model%platens%first)%force(model%platens%axis) / model%platens%width
+    end if
+    call show_progress(record%progress, status, errors)
+  end subroutine record_progress
+
+  !> A line on the screen and in the log.
+  subroutine record_line(record, text, errors)
+    type(record_t),     intent(inout) :: record
+    character(*),       intent(in)    :: text
+    type(error_list_t), intent(inout) :: errors
+
+    call say(record%progress, text, errors)
+  end subroutine record_line
+
+  !> Write a checkpoint of the state after a step and its outputs.
+  subroutine save_checkpoint(model, state, ledger, step, record, errors)
+    type(model_t),      intent(in)    :: model
+    type(state_t),      intent(in)    :: state
+    type(ledger_t),     intent(in)    :: ledger
+    integer,            intent(in)    :: step
+    type(record_t),     intent(in)    :: record
+    type(error_list_t), intent(inout) :: errors
+    type(checkpoint_t) :: checkpoint
+
+    checkpoint%step = step
+    checkpoint%time_step = model%motion%time_step
+    checkpoint%time = real(step, wp) * checkpoint%time_step
+    checkpoint%history_rows = record%history%rows
+    checkpoint%frames_written = record%frames
+    checkpoint%ledger_names = ledger_names
+    checkpoint%ledger = [ledger%initial_kinetic_energy, ledger%plastic_dissipation, &
+      ledger%damping_dissipation, ledger%external_work, ledger%largest_work]
+    checkpoint%input = record%values
+    checkpoint%position = model%body%position
+    checkpoint%volume = model%body%volume
+    call write_checkpoint(record%stem, checkpoint, state, errors)
+  end subroutine save_checkpoint
+
+  !> Read the newest checkpoint and compare its input with the present one.
+  !>
+  !> Errors, `file_errors`: no checkpoint that can be read; `input_errors`: values that differ.
+  subroutine load_checkpoint(input, checkpoint, state, ledger, warning, file_errors, input_errors)
+    type(input_t),      intent(in)    :: input
+    type(checkpoint_t), intent(out)   :: checkpoint
+    type(state_t),      intent(out)   :: state
+    type(ledger_t),     intent(out)   :: ledger
+    character(:), allocatable, intent(out) :: warning
+    type(error_list_t), intent(inout) :: file_errors, input_errors
+
+    call read_checkpoint(input%run%output_dir//'/'//input%run%name, checkpoint, state, warning, &
+      file_errors)
+    if (file_errors%count() > 0) return
+    if (size(checkpoint%ledger) /= size(ledger_names)) then
+      call file_errors%add('the checkpoint was written by another version of perigeo')
+      return
+    end if
+    ledger%initial_kinetic_energy = checkpoint%ledger(1)
+    ledger%plastic_dissipation = checkpoint%ledger(2)
+    ledger%damping_dissipation = checkpoint%ledger(3)
+    ledger%external_work = checkpoint%ledger(4)
+    ledger%largest_work = checkpoint%ledger(5)
+    call compare_used(checkpoint%input, used_values(input), input_errors)
+  end subroutine load_checkpoint
+
+  !> Whether the points of a checkpoint are those of the body (a point cloud may have changed).
+  pure logical function same_points(checkpoint, body) result(same)
+    type(checkpoint_t), intent(in) :: checkpoint
+    type(body_t),       intent(in) :: body
+
+    same = size(checkpoint%volume) == body%n
+    if (same) same = all(abs(checkpoint%position - body%position) <= 0.0_wp) &
+      .and. all(abs(checkpoint%volume - body%volume) <= 0.0_wp)
+  end function same_points
+
+end module pd_record

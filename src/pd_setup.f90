@@ -1,0 +1,335 @@
+!> From checked input to the model: body, operators, material, boundaries, motion, schedule.
+!>
+!> The only module that knows both the input and the physics.
+module pd_setup
+  use pd_boundary, only: boundary_t, mark_free, move, new_affine_boundary, new_rigid_boundary, &
+    platens_t, reference_ends, table_t, time_of_strain
+  use pd_cloud, only: read_cloud
+  use pd_errors, only: error_list_t
+  use pd_families, only: horizon_t, new_horizon
+  use pd_force, only: control_stiffness, solid_t
+  use pd_geometry, only: body_t, lattice_body, lattice_t, layer_t
+  use pd_input, only: resolved_path
+  use pd_input_types, only: boundary_input_t, input_t
+  use pd_j2, only: new_j2
+  use pd_kinds, only: is_set, wp
+  use pd_kinematics, only: inverse_shape_tensor
+  use pd_operators, only: new_operators, operators_t
+  use pd_schedule, only: new_schedule, schedule_t
+  use pd_stability, only: highest_frequency, wave_speed
+  use pd_state, only: state_t
+  use pd_verlet, only: frame_t, motion_t, reference_velocity
+  implicit none
+  private
+
+  public :: model_t, set_up_body, set_up_model, set_up_schedule, start, damping_frame
+
+  !> Everything about a run that does not change while it runs, and the boundaries with the forces
+  !> of the present step.
+  type :: model_t
+    type(body_t)      :: body
+    type(operators_t) :: operators
+    type(solid_t)     :: solid
+    type(motion_t)    :: motion
+    type(platens_t)   :: platens
+    type(boundary_t), allocatable :: boundaries(:)
+    real(wp), allocatable :: free(:, :)      !! 1: free, 0: prescribed component (n,2)
+    real(wp) :: spacing = 0.0_wp             !! dx [m]
+    real(wp) :: delta = 0.0_wp               !! horizon [m]
+    logical  :: damped_in_frame = .false.    !! damping acts in the frame of the platens
+    real(wp) :: highest_frequency = 0.0_wp   !! of the linearised operator [1/s]; 0: not asked for
+  end type model_t
+
+contains
+
+  !> Points, volumes and boundary sets.
+  !>
+  !> Errors: a cloud file that is wrong; a body without points, a boundary without points.
+  subroutine set_up_body(input, body, warnings, errors)
+    type(input_t),      intent(in)    :: input
+    type(body_t),       intent(out)   :: body
+    type(error_list_t), intent(inout) :: warnings, errors
+
+    if (input%bodies(1)%shape == 'file') then
+      call cloud_body(input, body, errors)
+    else
+      call rectangle_body(input, body, warnings, errors)
+    end if
+  end subroutine set_up_body
+
+  !> Body from a point cloud. Where the input gives its real extent, that counts.
+  subroutine cloud_body(input, body, errors)
+    type(input_t),      intent(in)    :: input
+    type(body_t),       intent(out)   :: body
+    type(error_list_t), intent(inout) :: errors
+    character(64) :: names(size(input%boundaries))
+    integer :: k
+
+    do k = 1, size(names)
+      names(k) = input%boundaries(k)%name
+    end do
+    associate (cloud => input%bodies(1))
+      call read_cloud(resolved_path(input, cloud%file), names, body, errors)
+      if (is_set(cloud%x_min)) then
+        body%lower = [cloud%x_min, cloud%y_min]
+        body%upper = [cloud%x_max, cloud%y_max]
+      end if
+    end associate
+    if (errors%count() > 0) return
+    do k = 1, size(names)
+      if (.not. any(body%boundary == k)) &
+        call errors%add('a boundary holds no point', '&boundary name = '//trim(names(k)))
+    end do
+  end subroutine cloud_body
+
+  !> Body from rectangles on one lattice.
+  subroutine rectangle_body(input, body, warnings, errors)
+    type(input_t),      intent(in)    :: input
+    type(body_t),       intent(out)   :: body
+    type(error_list_t), intent(inout) :: warnings, errors
+    real(wp) :: lower(2, size(input%bodies)), upper(2, size(input%bodies)), asked(4), found(4)
+    type(layer_t)   :: layers(size(input%boundaries))
+    type(lattice_t) :: lattice
+    character(120)  :: text
+    integer :: k
+
+    do k = 1, size(input%bodies)
+      lower(:, k) = [input%bodies(k)%x_min, input%bodies(k)%y_min]
+      upper(:, k) = [input%bodies(k)%x_max, input%bodies(k)%y_max]
+    end do
+    associate (d => input%discretisation)
+      lattice%spacing = d%spacing
+      lattice%cells = d%layout == 'cells'
+      lattice%tributary = d%volumes == 'tributary'
+      lattice%rows = ceiling(d%horizon / d%spacing - 1.0e-6_wp)
+    end associate
+    do k = 1, size(layers)
+      layers(k)%side = input%boundaries(k)%side
+      layers(k)%boundary = k
+    end do
+    call lattice_body(lower, upper, lattice, layers, body, errors)
+    asked = [minval(lower, dim=2), maxval(upper, dim=2)]
+    found = [body%lower, body%upper]
+    if (any(abs(found - asked) > 1.0e-6_wp * lattice%spacing) .and. errors%count() == 0) then
+      write (text, '(a,4(g0.8,a))') 'the body is adjusted to the spacing: x from ', found(1), &
+        ' to ', found(3), ' m, y from ', found(2), ' to ', found(4), ' m'
+      call warnings%add(trim(text), '&body')
+    end if
+  end subroutine rectangle_body
+
+  !> Operators, material, boundaries, motion.
+  !>
+  !> Errors: points that coincide, families that are too small, no free point.
+  subroutine set_up_model(input, model, errors)
+    type(input_t),      intent(in)    :: input
+    type(model_t),      intent(inout) :: model    !! in: with its body
+    type(error_list_t), intent(inout) :: errors
+    type(horizon_t) :: horizon
+
+    model%spacing = input%discretisation%spacing
+    model%delta = input%discretisation%horizon
+    horizon = new_horizon(model%delta, input%discretisation%influence)
+    call new_operators(horizon, model%body%position, model%body%volume, model%operators, errors)
+    if (errors%count() > 0) return
+    allocate (model%solid%k_inverse(model%body%n, 3))
+    call inverse_shape_tensor(model%operators, model%body%position, model%solid%k_inverse, errors)
+    if (errors%count() > 0) return
+    call set_up_solid(input, model)
+    call set_up_boundaries(input, model)
+    if (.not. any(model%free > 0.0_wp)) call errors%add('no point is free to move')
+  end subroutine set_up_model
+
+  !> Material, its flaw, zero-energy control.
+  subroutine set_up_solid(input, model)
+    type(input_t), intent(in)    :: input
+    type(model_t), intent(inout) :: model
+    integer  :: i
+    real(wp) :: distance
+
+    associate (m => input%material, flaw => input%imperfection, solid => model%solid)
+      solid%density = m%density
+      solid%material = new_j2(m%youngs_modulus, m%poissons_ratio)
+      solid%material%plastic = m%model == 'j2'
+      solid%material%kinematic_modulus = m%kinematic_modulus
+      solid%material%isotropic_modulus = m%isotropic_modulus
+      solid%material%residual_strength = max(0.0_wp, m%residual_strength)
+      allocate (solid%yield_stress(model%body%n), source=m%yield_stress)
+      do i = 1, model%body%n
+        distance = norm2(model%body%position(i, :) - [flaw%x, flaw%y])
+        if (flaw%amplitude > 0.0_wp .and. distance <= flaw%radius * (1.0_wp + 1.0e-6_wp)) &
+          solid%yield_stress(i) = (1.0_wp - flaw%amplitude) * solid%yield_stress(i)
+      end do
+      if (input%stabilisation%method == 'silling') then
+        allocate (solid%control(model%body%n), source=control_stiffness( &
+          input%stabilisation%factor, m%youngs_modulus, model%delta, model%operators%weight_sum))
+      end if
+    end associate
+  end subroutine set_up_solid
+
+  !> Boundaries with their motions, platens, damping.
+  subroutine set_up_boundaries(input, model)
+    type(input_t), intent(in)    :: input
+    type(model_t), intent(inout) :: model
+    integer :: k
+
+    allocate (model%boundaries(size(input%boundaries)))
+    do k = 1, size(input%boundaries)
+      model%boundaries(k) = new_boundary(input%boundaries(k), k, model%body)
+    end do
+    allocate (model%free(model%body%n, 2))
+    call mark_free(model%body%position, model%body%volume, input%material%density, &
+      model%boundaries, model%free)
+
+    model%motion%density = input%material%density
+    model%motion%damping = input%integration%damping
+    if (input%platens(1) == 0) return
+    associate (p => model%platens, body => model%body)
+      p%first = input%platens(1)
+      p%second = input%platens(2)
+      p%axis = merge(1, 2, input%boundaries(p%first)%side == 'left')
+      p%start = body%lower(p%axis)
+      p%length = body%upper(p%axis) - body%lower(p%axis)
+      p%width = body%upper(3 - p%axis) - body%lower(3 - p%axis)
+      model%motion%axis = p%axis
+      model%motion%start = p%start
+      model%motion%length = p%length
+    end associate
+    model%damped_in_frame = input%integration%damping_frame == 'platens'
+  end subroutine set_up_boundaries
+
+  !> Boundary k of the body.
+  type(boundary_t) function new_boundary(given, k, body) result(boundary)
+    type(boundary_input_t), intent(in) :: given
+    integer,                intent(in) :: k
+    type(body_t),           intent(in) :: body
+    type(table_t) :: tables(2)
+    integer, allocatable :: points(:)
+    logical :: prescribed(2)
+    integer :: i
+
+    allocate (points(count(body%boundary == k)))
+    points = pack([(i, i=1, body%n)], body%boundary == k)
+    if (given%contact == 'affine') then
+      tables(1) = new_table(given%times, given%factors, 1.0_wp)
+      boundary = new_affine_boundary(given%name, points, given%velocity_gradient, tables(1))
+      return
+    end if
+    prescribed = .true.
+    if (given%contact == 'smooth') then
+      prescribed = [given%side == 'left' .or. given%side == 'right', &
+        given%side == 'bottom' .or. given%side == 'top']
+    end if
+    tables(1) = new_table(given%times, given%velocities_x, given%velocity(1))
+    tables(2) = new_table(given%times, given%velocities_y, given%velocity(2))
+    boundary = new_rigid_boundary(given%name, points, prescribed, tables(1), tables(2))
+  end function new_boundary
+
+  !> Table from the input; without one, a constant.
+  pure type(table_t) function new_table(times, rates, constant) result(table)
+    real(wp), intent(in) :: times(:), rates(:), constant
+
+    if (size(times) > 0 .and. size(rates) > 0) then
+      allocate (table%times(size(times)), source=times)
+      allocate (table%rates(size(times)), source=rates)
+    else
+      allocate (table%times(1), source=0.0_wp)
+      allocate (table%rates(1), source=constant)
+    end if
+  end function new_table
+
+  !> Time step by the rule asked for, and the steps of the run, its frames and rows.
+  !>
+  !> `time_step`: that of a checkpoint; 0: by the rule.
+  !> Errors: a run with too many steps, a strain that is never reached.
+  subroutine set_up_schedule(input, time_step, model, schedule, errors)
+    type(input_t),      intent(in)    :: input
+    real(wp),           intent(in)    :: time_step   !! [s]
+    type(model_t),      intent(inout) :: model
+    type(schedule_t),   intent(out)   :: schedule
+    type(error_list_t), intent(inout) :: errors
+    real(wp), allocatable :: frame_times(:)
+    real(wp) :: end_time
+    integer  :: k, iterations
+
+    associate (given => input%integration, dt => model%motion%time_step)
+      dt = time_step
+      if (dt <= 0.0_wp) then
+        select case (given%time_step_rule)
+        case ('fixed')
+          dt = given%time_step
+        case ('courant')
+          dt = given%safety * model%spacing / wave_speed(model%solid)
+        case default
+          call highest_frequency(model%operators, model%solid, model%body%volume, model%free, &
+            model%highest_frequency, iterations)
+          dt = given%safety * 2.0_wp / model%highest_frequency
+        end select
+      end if
+      end_time = given%end_time
+      if (is_set(given%final_strain)) end_time = strain_time(given%final_strain)
+    end associate
+
+    associate (given => input%output)
+      if (size(given%frame_strains) > 0) then
+        allocate (frame_times(size(given%frame_strains)))
+        do k = 1, size(frame_times)
+          frame_times(k) = strain_time(given%frame_strains(k))
+        end do
+      else if (size(given%frame_times) > 0) then
+        allocate (frame_times(size(given%frame_times)), source=given%frame_times)
+      else
+        allocate (frame_times(given%frame_count))
+        frame_times = [(end_time * real(k, wp) / real(size(frame_times), wp), &
+          k=1, size(frame_times))]
+      end if
+    end associate
+    if (errors%count() > 0) return
+    if (any(frame_times > end_time * (1.0_wp + 1.0e-9_wp))) then
+      call errors%add('a frame is asked for after the end of the run', '&output')
+      return
+    end if
+    call new_schedule(model%motion%time_step, end_time, input%output%history_count, frame_times, &
+      schedule, errors)
+
+  contains
+
+    !> Time at which the nominal strain reaches a value.
+    real(wp) function strain_time(strain) result(time)
+      real(wp), intent(in) :: strain
+      character(24) :: text
+
+      time = time_of_strain(model%platens, model%boundaries, strain)
+      if (time > 0.0_wp) return
+      write (text, '(g0.6)') strain
+      call errors%add('the motion of the platens never reaches a nominal strain', &
+        '&integration final_strain or &output frame_strains', trim(text))
+    end function strain_time
+
+  end subroutine set_up_schedule
+
+  !> Velocity at both ends of the frame in which the damping acts, at time t.
+  pure type(frame_t) function damping_frame(model, t) result(frame)
+    type(model_t), intent(in) :: model
+    real(wp),      intent(in) :: t   !! [s]
+
+    if (model%damped_in_frame) &
+      call reference_ends(model%platens, model%boundaries, t, frame%lower, frame%upper)
+  end function damping_frame
+
+  !> State at t = 0: unloaded, moving with the frame of the damping, boundaries with theirs.
+  subroutine start(model, state)
+    type(model_t), intent(in)  :: model
+    type(state_t), intent(out) :: state
+    type(frame_t) :: frame
+    integer :: k
+
+    call state%allocate(model%body%n)
+    frame = damping_frame(model, 0.0_wp)
+    do k = 1, 2
+      state%velocity(:, k) = reference_velocity(model%motion, frame, k, &
+        model%body%position(:, model%motion%axis))
+    end do
+    call move(model%boundaries, model%body%position, 0.0_wp, state%displacement, state%velocity)
+  end subroutine start
+
+end module pd_setup

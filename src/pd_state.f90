@@ -1,0 +1,37 @@
+!> The state of a run: everything that changes from step to step at the points.
+module pd_state
+  use pd_kinds, only: wp
+  implicit none
+  private
+
+  public :: state_t
+
+  !> Fields over all n points, fictitious ones included.
+  type :: state_t
+    real(wp), allocatable :: displacement(:, :)          !! u (n,2) [m]
+    real(wp), allocatable :: velocity(:, :)              !! v (n,2) [m/s]
+    real(wp), allocatable :: force(:, :)                 !! internal force density f (n,2) [N/m^3]
+    real(wp), allocatable :: deformation_gradient(:, :)  !! F (n,4) xx xy yx yy
+    real(wp), allocatable :: stress(:, :)                !! S (n,4) xx yy zz xy [Pa]
+    real(wp), allocatable :: plastic_strain(:, :)        !! E^p (n,4) xx yy zz xy
+    real(wp), allocatable :: back_stress(:, :)           !! beta (n,4) xx yy zz xy [Pa]
+    real(wp), allocatable :: alpha(:)                    !! equivalent plastic strain (n)
+  contains
+    procedure :: allocate => allocate_state
+  end type state_t
+
+contains
+
+  !> The unloaded state of n points.
+  subroutine allocate_state(self, n)
+    class(state_t), intent(out) :: self
+    integer,        intent(in)  :: n
+
+    allocate (self%displacement(n, 2), self%velocity(n, 2), self%force(n, 2), source=0.0_wp)
+    allocate (self%deformation_gradient(n, 4), source=0.0_wp)
+    self%deformation_gradient(:, [1, 4]) = 1.0_wp
+    allocate (self%stress(n, 4), self%plastic_strain(n, 4), self%back_stress(n, 4), source=0.0_wp)
+    allocate (self%alpha(n), source=0.0_wp)
+  end subroutine allocate_state
+
+end module pd_state

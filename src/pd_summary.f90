@@ -1,0 +1,143 @@
+!> The derived figures of a run in words: what `--check` prints and the log begins with.
+module pd_summary
+  use, intrinsic :: iso_fortran_env, only: int64
+  use pd_force, only: linear_force
+  use pd_input_types, only: input_t
+  use pd_kinds, only: wp
+  use pd_schedule, only: schedule_t
+  use pd_setup, only: model_t
+  use pd_stability, only: wave_speed
+  implicit none
+  private
+
+  public :: summary_t, summarise, estimated_seconds
+
+  !> Lines of text.
+  type :: summary_t
+    character(112), allocatable :: lines(:)
+  contains
+    procedure :: add
+  end type summary_t
+
+contains
+
+  !> Append 'label  text'.
+  pure subroutine add(self, label, text)
+    class(summary_t), intent(inout) :: self
+    character(*),     intent(in)    :: label, text
+    character(112), allocatable :: longer(:)
+    character(20) :: column
+    integer :: n
+
+    n = 0
+    if (allocated(self%lines)) n = size(self%lines)
+    allocate (longer(n + 1))
+    if (n > 0) longer(:n) = self%lines
+    column = label
+    longer(n + 1) = '  '//column//text
+    call move_alloc(longer, self%lines)
+  end subroutine add
+
+  !> Points, bonds, lengths, time step, steps, memory.
+  function summarise(input, model, schedule) result(summary)
+    type(input_t),    intent(in) :: input
+    type(model_t),    intent(in) :: model
+    type(schedule_t), intent(in) :: schedule
+    type(summary_t) :: summary
+    character(:), allocatable :: text
+    integer  :: fewest, point
+    real(wp) :: courant
+
+    associate (body => model%body, bonds => real(model%operators%bonds(), wp))
+      call summary%add('title', input%run%title)
+      call summary%add('body', number(body%upper(1) - body%lower(1))//' m x '// &
+        number(body%upper(2) - body%lower(2))//' m')
+      call summary%add('points', whole(body%n)//', of which fictitious '// &
+        whole(count(body%boundary > 0)))
+      call model%operators%fewest_bonds(fewest, point)
+      call summary%add('bonds', number(bonds)//'; per point '//number(bonds / real(body%n, wp))// &
+        ' on average, '//whole(fewest)//' at least')
+      call summary%add('horizon', number(model%delta)//' m = '// &
+        number(model%delta / model%spacing)//' spacings of '//number(model%spacing)//' m')
+      call summary%add('wave speed', 'c_p = '//number(wave_speed(model%solid))//' m/s')
+      courant = model%spacing / wave_speed(model%solid)
+      text = number(schedule%time_step)//' s = '//number(schedule%time_step / courant)// &
+        ' dx/c_p, rule '//input%integration%time_step_rule
+      if (model%highest_frequency > 0.0_wp) text = text//': '// &
+        number(input%integration%safety)//' x limit 2/omega_max = '// &
+        number(2.0_wp / model%highest_frequency)//' s'
+      call summary%add('time step', text)
+      call summary%add('steps', whole(schedule%steps)//' to '//number(schedule%end_time)//' s')
+      if (model%platens%axis > 0) call summary%add('platens', &
+        model%boundaries(model%platens%first)%name//' and '// &
+        model%boundaries(model%platens%second)%name//', '//number(model%platens%length)// &
+        ' m apart')
+      call summary%add('frames', whole(size(schedule%frame_steps))// &
+        ' and the unloaded state; history rows '//whole(schedule%rows))
+      call summary%add('memory', number(memory(model) / 1.0e6_wp)//' MB')
+    end associate
+  end function summarise
+
+  !> Memory of a run [bytes]: bonds, fields of the state (23 numbers a point), what is fixed (12),
+  !> work space (4), a frame on its way to the disk (18).
+  pure real(wp) function memory(model)
+    type(model_t), intent(in) :: model
+
+    memory = model%operators%memory() + real(model%body%n, wp) * 8.0_wp * (23 + 12 + 4 + 18)
+  end function memory
+
+  !> Wall clock time of the run [s], from a few applications of the operators to this very model.
+  real(wp) function estimated_seconds(model, schedule) result(seconds)
+    type(model_t),    intent(in) :: model
+    type(schedule_t), intent(in) :: schedule
+    !> A step with radial return, motion and energies against one with the linear operator.
+    real(wp), parameter :: whole_step = 1.5_wp
+    integer,  parameter :: repetitions = 5
+    real(wp), allocatable :: h(:, :), a(:, :), f(:, :)
+    integer(int64) :: start, finish, rate
+    integer :: k
+
+    allocate (h(model%body%n, 4), a(model%body%n, 4), f(model%body%n, 2))
+    start = 0
+    rate = 1
+    do k = 0, repetitions
+      if (k == 1) call system_clock(start, rate)
+      call linear_force(model%operators, model%solid, model%body%position, h, a, f)
+    end do
+    call system_clock(finish)
+    seconds = whole_step * real(finish - start, wp) / real(rate, wp) / real(repetitions, wp) &
+      * real(schedule%steps, wp)
+  end function estimated_seconds
+
+  !> Up to five significant digits.
+  pure function number(x) result(text)
+    real(wp), intent(in) :: x
+    character(:), allocatable :: text
+    character(24) :: buffer
+    character(8)  :: form
+    integer :: decimals
+
+    if (abs(x) >= 1.0e7_wp .or. (abs(x) < 1.0e-3_wp .and. abs(x) > 0.0_wp)) then
+      write (buffer, '(es12.4)') x
+    else if (abs(x - anint(x)) < 1.0e-9_wp * abs(x)) then
+      write (buffer, '(i0)') nint(x)
+    else
+      decimals = max(0, 4 - floor(log10(abs(x))))
+      write (form, '(a,i0,a)') '(f24.', decimals, ')'
+      write (buffer, form) x
+      if (decimals > 0) buffer = buffer(:verify(buffer, '0', back=.true.))
+    end if
+    text = trim(adjustl(buffer))
+  end function number
+
+  !> A whole number.
+  pure function whole(i) result(text)
+    integer, intent(in) :: i
+    character(:), allocatable :: text
+    character(12) :: buffer
+
+    write (buffer, '(i0)') i
+    text = trim(buffer)
+  end function whole
+
+end module pd_summary

@@ -1,0 +1,148 @@
+!> The XDMF file beside a result file: what lets ParaView open it.
+!>
+!> It holds no numbers, only where they lie in the HDF5 file, named without a folder so that both
+!> can be moved together. Vectors in the plane get a third component 0, which ParaView's filters
+!> (warp, glyph) ask for; tensors become one scalar a component.
+module pd_xdmf
+  use pd_errors, only: error_list_t
+  use pd_files, only: write_whole_file
+  use pd_kinds, only: wp
+  use pd_text, only: integer_text
+  implicit none
+  private
+
+  public :: field_t, xdmf_grid, write_xdmf
+
+  !> A field over the points, as the frames of a result file hold it.
+  type :: field_t
+    character(16)  :: name
+    character(4)   :: unit
+    integer        :: width         !! number of components
+    character(12)  :: components    !! their names, blank between; '' where there is one
+    character(120) :: description
+  end type field_t
+
+
+  character(*), parameter :: nl = new_line('a')
+
+contains
+
+  !> Write the XDMF file of a result anew, from the grids of its frames one after the other.
+  !>
+  !> Errors: it cannot be written or put in place.
+  subroutine write_xdmf(path, grids, errors)
+    character(*),       intent(in)    :: path, grids
+    type(error_list_t), intent(inout) :: errors
+
+    call write_whole_file(path, '<?xml version="1.0" ?>'//nl//'<Xdmf Version="2.0">'//nl &
+      //'<Domain>'//nl//'<Grid Name="frames" GridType="Collection" CollectionType="Temporal">' &
+      //nl//grids//'</Grid>'//nl//'</Domain>'//nl//'</Xdmf>', errors)
+  end subroutine write_xdmf
+
+  !> The grid of one frame.
+  pure function xdmf_grid(data_file, n, fields, index_of_frame, at_time) result(text)
+    character(*),  intent(in) :: data_file        !! name of the HDF5 file, without its folder
+    integer,       intent(in) :: n                !! number of points
+    type(field_t), intent(in) :: fields(:)
+    integer,       intent(in) :: index_of_frame   !! k of /frames/k, written with six digits
+    real(wp),      intent(in) :: at_time          !! [s]
+    character(:), allocatable :: text, source
+    character(24) :: time
+    character(6)  :: group
+    integer :: i
+
+    write (time, '(es24.16e3)') at_time
+    write (group, '(i6.6)') index_of_frame
+    source = escaped(data_file)//':/points/'
+    text = '<Grid Name="'//group//'" GridType="Uniform">'//nl &
+      //'<Time Value="'//trim(adjustl(time))//'"/>'//nl &
+      //'<Topology TopologyType="Polyvertex" NodesPerElement="1" NumberOfElements="' &
+      //integer_text(n)//'"/>'//nl//'<Geometry GeometryType="XY">'//nl &
+      //whole_item(source//'position', integer_text(n)//' 2', 'Float', 8)//'</Geometry>'//nl &
+      //attribute('volume', 'Scalar', whole_item(source//'volume', integer_text(n), 'Float', 8)) &
+      //attribute('boundary', 'Scalar', whole_item(source//'boundary', integer_text(n), 'Int', 4))
+    source = escaped(data_file)//':/frames/'//group//'/'
+    do i = 1, size(fields)
+      text = text//field_text(source//trim(fields(i)%name), n, fields(i))
+    end do
+    text = text//'</Grid>'//nl
+  end function xdmf_grid
+
+  pure function field_text(source, n, field) result(text)
+    character(*),  intent(in) :: source
+    integer,       intent(in) :: n
+    type(field_t), intent(in) :: field
+    character(:), allocatable :: text, rest
+    integer :: c, blank
+
+    select case (field%width)
+    case (1)
+      text = attribute(trim(field%name), 'Scalar', whole_item(source, integer_text(n), 'Float', 8))
+    case (2)
+      text = attribute(trim(field%name), 'Vector', '<DataItem ItemType="Function" ' &
+        //'Function="JOIN($0, $1, 0 * $1)" Dimensions="'//integer_text(n)//' 3">'//nl &
+        //column_item(source, n, field%width, 1)//column_item(source, n, field%width, 2) &
+        //'</DataItem>'//nl)
+    case default
+      text = ''
+      rest = field%components
+      do c = 1, field%width
+        blank = index(rest, ' ')
+        text = text//attribute(trim(field%name)//'_'//rest(:blank - 1), 'Scalar', &
+          column_item(source, n, field%width, c))
+        rest = rest(blank + 1:)//' '
+      end do
+    end select
+  end function field_text
+
+  pure function attribute(name, kind_of_field, item) result(text)
+    character(*), intent(in) :: name, kind_of_field, item
+    character(:), allocatable :: text
+
+    text = '<Attribute Name="'//name//'" AttributeType="'//kind_of_field//'" Center="Node">'//nl &
+      //item//'</Attribute>'//nl
+  end function attribute
+
+  pure function whole_item(source, dimensions, number_type, bytes) result(text)
+    character(*), intent(in) :: source, dimensions, number_type
+    integer,      intent(in) :: bytes
+    character(:), allocatable :: text
+
+    text = '<DataItem Dimensions="'//dimensions//'" NumberType="'//number_type//'" Precision="' &
+      //integer_text(bytes)//'" Format="HDF">'//source//'</DataItem>'//nl
+  end function whole_item
+
+  !> Column c of an array of shape (n,width).
+  pure function column_item(source, n, width, c) result(text)
+    character(*), intent(in) :: source
+    integer,      intent(in) :: n, width, c
+    character(:), allocatable :: text
+
+    text = '<DataItem ItemType="HyperSlab" Dimensions="'//integer_text(n)//'">'//nl &
+      //'<DataItem Dimensions="3 2" Format="XML">0 '//integer_text(c - 1)//' 1 1 ' &
+      //integer_text(n)//' 1</DataItem>'//nl &
+      //whole_item(source, integer_text(n)//' '//integer_text(width), 'Float', 8)//'</DataItem>'//nl
+  end function column_item
+
+  !> A name as XML text.
+  pure function escaped(name) result(text)
+    character(*), intent(in) :: name
+    character(:), allocatable :: text
+    integer :: i
+
+    text = ''
+    do i = 1, len(name)
+      select case (name(i:i))
+      case ('&')
+        text = text//'&amp;'
+      case ('<')
+        text = text//'&lt;'
+      case ('>')
+        text = text//'&gt;'
+      case default
+        text = text//name(i:i)
+      end select
+    end do
+  end function escaped
+
+end module pd_xdmf

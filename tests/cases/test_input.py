@@ -1,0 +1,136 @@
+"""Wrong input: every mistake is named, the exit status is 2, and nothing is written."""
+
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+
+VALID = """\
+&run name = 'case' /
+&discretisation spacing = 0.1, horizon = 0.3 /
+&body x_min = 0.0, x_max = 0.5, y_min = 0.0, y_max = 1.0 /
+&material model = 'j2', density = 2000.0, youngs_modulus = 50.0e6, poissons_ratio = 0.3
+  yield_stress = 0.15e6, kinematic_modulus = -1.5e6, residual_strength = 15.0e3 /
+&boundary name = 'bottom', side = 'bottom' /
+&boundary name = 'top', side = 'top', velocity = 0.0, -0.01 /
+&integration final_strain = 0.001 /
+&output frame_strains = 0.0005, 0.001 /
+"""
+
+# what is replaced in the valid file, by what, and what the message must hold
+MISTAKES = {
+    "misspelt group": ("&output", "&ouput", "&ouput: unknown group, did you mean 'output'?"),
+    "misspelt key": ("spacing =", "spcing =", "unknown key, did you mean 'spacing'?"),
+    "misspelt choice": ("'j2'", "'j3'", "unknown choice, did you mean 'j2'?"),
+    "key of another group": ("x_min", "velocity", "it belongs to &boundary"),
+    "text for a number": ("= 0.1,", "= 'abc',", "spacing: text where a number is due"),
+    "word for a number": ("= 0.1,", "= abc,", "found: abc; allowed: > 0 [m]"),
+    "not a number": ("= 0.1,", "= NaN,", "found: NaN; allowed: > 0 [m]"),
+    "infinite number": ("= 0.1,", "= Infinity,", "found: Infinity; allowed: > 0 [m]"),
+    "number too large": ("= 0.1,", "= 1e999,", "a number outside 1e-100 to 1e100 in magnitude"),
+    "number out of range": ("= 0.3\n", "= 0.5\n", "found: 0.5; allowed: > -1 and < 0.5"),
+    "negative spacing": ("= 0.1,", "= -0.1,", "line 2, &discretisation spacing: out of range"),
+    "text without quotes": ("'j2'", "j2", "model: text must stand in quotes; found: j2"),
+    "too many values": ("-0.01", "-0.01, 1.0", "velocity: too many values; found: 3 values"),
+    "too few values": ("0.0, -0.01", "-0.01", "velocity: too few values; found: 1 value"),
+    "missing slash": ("0.3 /\n&body", "0.3\n&body", "group &discretisation is not ended by /"),
+    "last slash missing": ("0.001 /\n&output", "0.001 &output", "group &integration is not ended"),
+    "missing quote": ("'case'", "'case", "a text without its closing quote"),
+    "missing value": ("= 0.1,", "=", "&discretisation spacing has no value"),
+    "missing key": ("spacing = 0.1, ", "", "spacing: the key is missing; allowed: > 0 [m]"),
+    "missing group": ("&run name = 'case' /", "", "group &run is missing"),
+    "key given twice": ("x_max", "x_min", "&body x_min is given twice"),
+    "group given twice": ("&output", "&run name = 'b' /\n&output", "the group is given twice"),
+    "value without a key": ("spacing = 0.1", "0.1", "a value without a key in &discretisation"),
+    "text outside of groups": ("&output", "rubbish\n&output", "text outside of a group"),
+    "name that is a path": ("'case'", "'../case'", "name: not a name; found: '../case'"),
+    "later key": ("name = 'case'", "name = 'case', operators = 'list'", "operators: unknown key"),
+    "extent off the lattice": ("x_max = 0.5", "x_max = 0.53", "allowed: nearest 0.5 or 0.6 [m]"),
+    "horizon too small": ("= 0.3 /", "= 0.05 /", "the horizon is less than the spacing"),
+    "no residual strength": (", residual_strength = 15.0e3", "", "residual_strength: the key is"),
+    "two ends": ("final_strain", "end_time = 1, final_strain", "end of the run is given twice"),
+    "platens apart": ("-0.01", "0.01", "the platens do not approach each other"),
+    "no platens": ("side = 'top'", "side = 'left'", "the key needs platens, and there are none"),
+    "frame beyond the end": ("0.0005, 0.001", "0.002", "a frame beyond the end of the run"),
+    "cloud that is not there": (
+        "x_min = 0.0, x_max = 0.5, y_min = 0.0, y_max = 1.0",
+        "shape = 'file', file = 'none.txt'",
+        "the file does not exist; found: 'none.txt'",
+    ),
+}
+
+
+def everything_in(folder):
+    """Return all paths under a folder with their contents."""
+    return {path: path.is_file() and path.read_bytes() for path in folder.rglob("*")}
+
+
+def assert_refused(done, folder, *parts):
+    """Assert that a run was refused with these messages, and left nothing behind."""
+    assert done.returncode == 2, done.stderr
+    for part in parts:
+        assert part in done.stderr
+    for line in done.stderr.splitlines():
+        assert line.startswith("perigeo: error: ")
+    assert [path.name for path in folder.iterdir()] == ["run.nml"]
+
+
+def test_the_valid_file_passes_the_check(run_case, tmp_path):
+    done = run_case(VALID, tmp_path, "--check")
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+@pytest.mark.parametrize("options", [[], ["--check"]], ids=["run", "check"])
+def test_a_mistake_is_named_and_nothing_is_written(run_case, tmp_path, mistake, options):
+    old, new, part = MISTAKES[mistake]
+    assert old in VALID
+    done = run_case(VALID.replace(old, new, 1), tmp_path, *options)
+    assert_refused(done, tmp_path, part)
+    assert "run.nml" in done.stderr
+
+
+def test_all_mistakes_are_listed_in_one_go(run_case, tmp_path):
+    text = VALID
+    names = ["misspelt group", "text for a number", "misspelt choice", "number out of range"]
+    names += ["too many values", "name that is a path", "key given twice"]
+    for name in names:
+        text = text.replace(*MISTAKES[name][:2], 1)
+    done = run_case(text, tmp_path)
+    assert_refused(done, tmp_path, *(MISTAKES[name][2] for name in names))
+
+
+def test_a_file_that_is_not_there_is_named(perigeo, tmp_path):
+    done = perigeo(["none.nml"], tmp_path)
+    assert done.returncode == 2
+    assert "none.nml: the input file cannot be read" in done.stderr
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_folder_is_not_an_input_file(perigeo, tmp_path):
+    done = perigeo(["."], tmp_path)
+    assert done.returncode == 2
+    assert "the input file cannot be read" in done.stderr
+
+
+@pytest.mark.parametrize("content", [b"", b"\0" * 5000, bytes(range(256)) * 5000, b"&" * 900000])
+def test_a_file_that_is_no_namelist_is_refused(perigeo, tmp_path, content):
+    (tmp_path / "run.nml").write_bytes(content)
+    assert_refused(perigeo(["run.nml"], tmp_path, timeout=60), tmp_path)
+
+
+def test_results_of_an_earlier_run_stay_when_the_input_is_wrong(run_case, tmp_path):
+    results = tmp_path / "results" / "case"
+    results.mkdir(parents=True)
+    (results / "case.h5").write_text("earlier")
+    (tmp_path / "run.nml").write_text(VALID.replace("'j2'", "'j3'"))
+    before = everything_in(tmp_path)
+    assert run_case(tmp_path / "run.nml", tmp_path, "--force").returncode == 2
+    assert everything_in(tmp_path) == before
+
+
+def test_the_reference_page_is_what_the_program_writes(perigeo, tmp_path):
+    done = perigeo(["--input-reference"], tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == (ROOT / "doc" / "input.md").read_text()

@@ -1,0 +1,593 @@
+"""Compare computed values with closed forms: `make verify`.
+
+Each case writes namelists, runs the program and reads its results with perigeo_post. The rows are
+printed as a table (quantity, exact, computed, error, tolerance, verdict), and written to
+results/verify/verify.json and verify.md; exit status 1 when one of them fails.
+
+    verify.py [CASE ...]   only these cases (names: verify.py --list)
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import platform
+import subprocess
+import sys
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from datetime import date
+from pathlib import Path
+
+import numpy as np
+from perigeo_post import PostError, Run, apparent_modulus, measure_band, peak, stress_strain
+
+ROOT = Path(__file__).resolve().parents[2]
+PROGRAM = Path(os.environ.get("PERIGEO_BIN", ROOT / "bin" / "perigeo"))
+RESULTS = ROOT / "results" / "verify"
+
+E, NU, SIGMA_Y, RHO = 50.0e6, 0.3, 0.15e6, 2000.0
+G = E / (2.0 * (1.0 + NU))
+C_P = float(np.sqrt(E * (1.0 - NU) / ((1.0 + NU) * (1.0 - 2.0 * NU)) / RHO))
+ROOT_3 = float(np.sqrt(3.0))
+
+Groups = list[tuple[str, dict[str, object]]]
+
+
+@dataclass
+class Row:
+    """One line of the table; errors are relative to `exact`."""
+
+    case: str
+    quantity: str
+    unit: str
+    exact: float
+    computed: float
+    tolerance: float
+    source: str  # where the exact value comes from
+    scale: float = 0.0  # what the error refers to; 0: the exact value
+
+    @property
+    def error(self) -> float:
+        return (self.computed - self.exact) / abs(self.scale or self.exact)
+
+    @property
+    def passed(self) -> bool:
+        return bool(abs(self.error) <= self.tolerance)
+
+
+def namelist(groups: Groups) -> str:
+    """Text of an input file."""
+
+    def text(value: object) -> str:
+        if isinstance(value, str):
+            return f"'{value}'"
+        if isinstance(value, (list, tuple)):
+            return ", ".join(repr(float(v)) for v in value)
+        return repr(value)
+
+    lines = []
+    for group, keys in groups:
+        lines.append(f"&{group}")
+        lines += [f"  {key} = {text(value)}" for key, value in keys.items()]
+        lines.append("/")
+    return "\n".join(lines) + "\n"
+
+
+def run(name: str, groups: Groups) -> Run:
+    """Run the program on one thread and open its result."""
+    folder = RESULTS / name
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / f"{name}.nml"
+    path.write_text(namelist([("run", {"name": name, "output_dir": str(folder)}), *groups]))
+    command = [str(PROGRAM), "--threads", "1", "--force", "--quiet", str(path)]
+    return execute(name, folder, command)
+
+
+def execute(name: str, folder: Path, command: list[str]) -> Run:
+    """Carry out a run and open its result."""
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode != 0:
+        raise RuntimeError(f"{name}: exit status {done.returncode}\n{done.stderr}")
+    return Run(folder / f"{name}.h5")
+
+
+def material(model: str = "j2", **keys: object) -> tuple[str, dict[str, object]]:
+    """The material of the paper without softening."""
+    values: dict[str, object] = {
+        "model": model,
+        "density": RHO,
+        "youngs_modulus": E,
+        "poissons_ratio": NU,
+    }
+    if model == "j2":
+        values["yield_stress"] = SIGMA_Y
+    return ("material", values | keys)
+
+
+def specimen(spacing: float, horizon: float, **keys: object) -> Groups:
+    """1 m x 2 m."""
+    return [
+        ("discretisation", {"spacing": spacing, "horizon": horizon, "fit": "nearest"} | keys),
+        ("body", {"x_min": 0.0, "x_max": 1.0, "y_min": 0.0, "y_max": 2.0}),
+    ]
+
+
+def platens(bottom: str = "rough", rate: float = 0.01) -> Groups:
+    """A fixed bottom and a smooth top that comes down."""
+    return [
+        ("boundary", {"name": "bottom", "side": "bottom", "contact": bottom}),
+        (
+            "boundary",
+            {"name": "top", "side": "top", "contact": "smooth", "velocity": (0.0, -rate)},
+        ),
+    ]
+
+
+# ------------------------------------------------------------------------------------- cases
+
+
+def moduli() -> list[Row]:
+    """E_app of the specimen of the paper against an independent calculation (theory, section 8)."""
+    expected = {
+        "fixed horizon 0.08 m": (51.4, 50.0, 49.6, 49.3, 49.2, 49.1),
+        "fixed spacing 0.02 m": (50.8, 50.2, 49.8, 49.3, 48.9, 48.5),
+    }
+    rows = []
+    for series, values in expected.items():
+        for m, value in enumerate(values, start=1):
+            horizon_fixed = "horizon" in series
+            spacing, horizon = (0.08 / m, 0.08) if horizon_fixed else (0.02, 0.02 * m)
+            groups = [
+                *specimen(spacing, horizon),
+                material("elastic"),
+                *platens(),
+                (
+                    "integration",
+                    {"final_strain": 1.0e-3, "damping": 5.0e5, "damping_frame": "platens"},
+                ),
+                ("output", {"history_count": 200, "frame_count": 1}),
+            ]
+            kind = "delta" if horizon_fixed else "dx"
+            result = run(f"modulus_{kind}_m{m}", groups)
+            rows.append(
+                Row(
+                    "modulus",
+                    f"E_app, {series}, m = {m}",
+                    "MPa",
+                    value,
+                    apparent_modulus(result).value / 1e6,
+                    5.0e-3,
+                    "independent",
+                )
+            )
+    return rows
+
+
+def affine_body(gradient: tuple[float, ...], **table: object) -> Groups:
+    """One free point whose surroundings move affinely: a test of the material alone.
+
+    With more free points the truncated families of the layers would disturb the outer ones.
+    """
+    return [
+        ("discretisation", {"spacing": 0.1, "horizon": 0.3, "layout": "cells"}),
+        ("body", {"x_min": -0.05, "x_max": 0.05, "y_min": -0.05, "y_max": 0.05}),
+        (
+            "boundary",
+            {
+                "name": "rim",
+                "side": "all",
+                "contact": "affine",
+                "velocity_gradient": gradient,
+                **table,
+            },
+        ),
+    ]
+
+
+def uniaxial() -> list[Row]:
+    """Slope and first yield of plane strain compression with free sides, as an affine map.
+
+    Stiff, so that the strains at yield are small and all stress measures agree.
+    """
+    rate, stiff = 5.0e-4, 20.0 * E
+    groups = [
+        *affine_body((NU / (1.0 - NU) * rate, 0.0, 0.0, -rate)),
+        material(youngs_modulus=stiff),
+        ("integration", {"end_time": 0.4, "damping": 5.0e5}),
+        ("output", {"history_count": 2000, "frame_count": 1}),
+    ]
+    history = run("uniaxial", groups).history()
+    stress, strain = -history["mean_stress_yy"], -history["mean_strain_yy"]
+    elastic = history["max_plastic_strain"] <= 0.0
+    early = elastic & (strain > 0.0)
+    last = int(np.flatnonzero(elastic)[-1])
+    return [
+        Row(
+            "elastic",
+            "slope E / (1 - nu^2)",
+            "MPa",
+            stiff / (1.0 - NU**2) / 1e6,
+            float(np.polyfit(strain[early], stress[early], 1)[0]) / 1e6,
+            2.0e-3,
+            "closed form",
+        ),
+        Row(
+            "elastic",
+            "first yield sigma_y / sqrt(1 - nu + nu^2)",
+            "kPa",
+            SIGMA_Y / float(np.sqrt(1.0 - NU + NU**2)) / 1e3,
+            float(stress[last]) / 1e3,
+            5.0e-3,
+            "closed form",
+        ),
+    ]
+
+
+def plateau() -> list[Row]:
+    """Perfectly plastic specimen: 2 sigma_y / sqrt(3). Stiff, so that strains stay small."""
+    groups = [
+        *specimen(0.05, 0.15, volumes="tributary"),
+        material(youngs_modulus=20.0 * E),
+        *platens("smooth", rate=0.01),
+        (
+            "integration",
+            {"final_strain": 2.0e-3, "damping": 2.0e6, "damping_frame": "platens"},
+        ),
+        ("output", {"history_count": 400, "frame_count": 1}),
+    ]
+    curve = stress_strain(run("plateau", groups))
+    return [
+        Row(
+            "plateau",
+            "plateau 2 sigma_y / sqrt(3)",
+            "kPa",
+            2.0 * SIGMA_Y / ROOT_3 / 1e3,
+            float(curve.y[-1]) / 1e3,
+            1.0e-2,
+            "closed form",
+        )
+    ]
+
+
+def shear(name: str, end: float, table: dict[str, object], **keys: object) -> Run:
+    """Simple shear of one point at 0.02 / s times a table, with 400 frames."""
+    return run(
+        name,
+        [
+            *affine_body((0.0, 0.02, 0.0, 0.0), **table),
+            material(**keys),
+            ("integration", {"end_time": end, "damping": 5.0e5}),
+            ("output", {"history_count": 10, "frame_count": 400}),
+        ],
+    )
+
+
+def shear_curve(result: Run) -> tuple[np.ndarray, np.ndarray]:
+    """Engineering shear strain and shear stress of the body [Pa]."""
+    gamma, tau = [], []
+    for frame in result.frames():
+        gamma.append(2.0 * float(frame["strain_xy"][result.body][0]))
+        tau.append(float(frame["stress_xy"][result.body][0]))
+    return np.array(gamma), np.array(tau)
+
+
+def softening() -> list[Row]:
+    """Simple shear beyond yield: d tau / d gamma = G H / (3 G + H), then the residual strength.
+
+    Soft enough to reach the residual strength at small strains.
+    """
+    rows = []
+    h, residual = -25.0e6, 0.5 * SIGMA_Y
+    exact = G * h / (3.0 * G + h)
+    for kind in ("kinematic", "isotropic"):
+        keys = {f"{kind}_modulus": h, "residual_strength": residual}
+        gamma, tau = shear_curve(shear(f"softening_{kind}", 0.6, {}, **keys))
+        falling = (gamma > 0.005) & (gamma < 0.0065)
+        rows.append(
+            Row(
+                "softening",
+                f"slope G H / (3 G + H), {kind}",
+                "MPa",
+                exact / 1e6,
+                float(np.polyfit(gamma[falling], tau[falling], 1)[0]) / 1e6,
+                1.0e-2,
+                "closed form",
+            )
+        )
+        rows.append(
+            Row(
+                "softening",
+                f"residual shear stress sigma_r / sqrt(3), {kind}",
+                "kPa",
+                residual / ROOT_3 / 1e3,
+                float(tau[-1]) / 1e3,
+                1.0e-2,
+                "closed form",
+            )
+        )
+    return rows
+
+
+def exact_loop(gamma: np.ndarray, h_k: float, h_i: float) -> np.ndarray:
+    """Shear stress of linear hardening in simple shear, step by step in closed form."""
+    tau_y, slope_k, slope_i = SIGMA_Y / ROOT_3, h_k / 3.0, h_i / 3.0
+    plastic = back = 0.0
+    tau = []
+    for g in gamma:
+        trial = G * (g - plastic)
+        excess = abs(trial - back) - tau_y
+        if excess > 0.0:
+            sign = 1.0 if trial > back else -1.0
+            d = excess / (G + slope_k + slope_i)
+            plastic += sign * d
+            back += sign * slope_k * d
+            tau_y += slope_i * d
+        tau.append(G * (g - plastic))
+    return np.array(tau)
+
+
+def cyclic() -> list[Row]:
+    """Cyclic simple shear: the loop, and the elastic range after reversal (Bauschinger)."""
+    times = [0.0, 0.5, 0.55, 1.5, 1.55, 2.5]
+    table = {"times": times, "factors": [1.0, 1.0, -1.0, -1.0, 1.0, 1.0]}
+    rows = []
+    for name, h_k, h_i in (("kinematic", 3.0e6, 0.0), ("mixed", 2.0e6, 2.0e6)):
+        keys = {"kinematic_modulus": h_k, "isotropic_modulus": h_i}
+        gamma, tau = shear_curve(shear(f"cyclic_{name}", 2.5, table, **keys))
+        exact = exact_loop(gamma, h_k, h_i)
+        worst = float(np.max(np.abs(tau - exact)))
+        rows.append(
+            Row(
+                "cyclic",
+                f"loop, {name} hardening: largest difference",
+                "kPa",
+                0.0,
+                worst / 1e3,
+                1.0e-2,
+                "closed form",
+                scale=float(np.max(np.abs(exact))) / 1e3,
+            )
+        )
+        if h_i == 0.0:
+            turn = int(np.argmax(gamma[: len(gamma) // 2]))
+            below = tau[turn] - tau[turn:]
+            off = np.abs((tau[turn] - tau[turn:]) - G * (gamma[turn] - gamma[turn:]))
+            elastic = off < 2.0e-3 * SIGMA_Y
+            first = int(np.argmin(elastic))
+            rows.append(
+                Row(
+                    "cyclic",
+                    "elastic range after reversal 2 sigma_y / sqrt(3)",
+                    "kPa",
+                    2.0 * SIGMA_Y / ROOT_3 / 1e3,
+                    float(below[first]) / 1e3,
+                    2.5e-2,
+                    "closed form",
+                )
+            )
+    return rows
+
+
+def wave() -> list[Row]:
+    """A constrained bar hit at its left end: time of flight of the front, and its stress.
+
+    The hit is ramped so that the front is long against the horizon. The layers above and below
+    slide with the bar and carry their share, so the stress is read at a point.
+    """
+    speed, spacing, rise = 0.01, 0.02, 0.6 / C_P
+    end = 3.6 / C_P
+    push = {"times": [0.0, rise], "velocities_x": [0.0, speed]}
+    groups = [
+        ("discretisation", {"spacing": spacing, "horizon": 3.0 * spacing, "layout": "cells"}),
+        ("body", {"x_min": 0.0, "x_max": 4.0, "y_min": 0.0, "y_max": 0.2}),
+        material("elastic"),
+        ("boundary", {"name": "left", "side": "left", "contact": "rough", **push}),
+        ("boundary", {"name": "below", "side": "bottom", "contact": "smooth"}),
+        ("boundary", {"name": "above", "side": "top", "contact": "smooth"}),
+        ("integration", {"end_time": end}),
+        ("output", {"history_count": 20, "frame_count": 300}),
+    ]
+    result = run("wave", groups)
+    frames = result.frames()
+    times = np.array([frame.time for frame in frames])
+    arrival = []
+    for x in (1.01, 2.51):
+        distance = np.hypot(result.positions[:, 0] - x, result.positions[:, 1] - 0.09)
+        point = int(np.argmin(distance))
+        v = np.array([frame["velocity_x"][point] for frame in frames])
+        after = int(np.argmax(v >= 0.5 * speed))
+        share = (0.5 * speed - v[after - 1]) / (v[after] - v[after - 1])
+        arrival.append(times[after - 1] + share * (times[after] - times[after - 1]))
+        if x < 2.0:
+            stress = np.array([frame["stress_xx"][point] for frame in frames])
+            behind = -float(np.mean(stress[times > arrival[0] + rise]))
+    return [
+        Row(
+            "wave",
+            "wave speed sqrt((lambda + 2 G) / rho)",
+            "m/s",
+            C_P,
+            1.5 / (arrival[1] - arrival[0]),
+            1.0e-2,
+            "closed form",
+        ),
+        Row(
+            "wave",
+            "stress behind the front rho c_p v",
+            "kPa",
+            RHO * C_P * speed / 1e3,
+            behind / 1e3,
+            1.0e-2,
+            "closed form",
+        ),
+    ]
+
+
+def shipped(name: str) -> Run:
+    """Run an input of the folder input/."""
+    folder = RESULTS / name
+    folder.mkdir(parents=True, exist_ok=True)
+    command = [str(PROGRAM), "--threads", "1", "--force", "--quiet", "--output", str(folder)]
+    return execute(name, folder, [*command, str(ROOT / "input" / f"{name}.nml")])
+
+
+def compression() -> list[Row]:
+    """The reference case against an independent calculation (doc/verification.md)."""
+    result = shipped("compression")
+    curve = stress_strain(result)
+    top, strain_at_top = peak(curve)
+    history = result.history()
+    found = [
+        ("peak axial stress", "kPa", 172.2, top / 1e3, 1.0e-2),
+        ("strain at the peak", "%", 0.349, 100.0 * strain_at_top, 2.0e-2),
+        ("axial stress at 1 %", "kPa", 40.6, curve.at(0.010) / 1e3, 2.0e-2),
+    ]
+    for strain, alpha in ((0.010, 0.200), (0.013, 0.244), (0.016, 0.282)):
+        frame = result.frame(strain=strain)
+        largest = float(np.max(frame["plastic_strain"][result.body]))
+        found.append((f"largest alpha at {100 * strain:.1f} %", "1", alpha, largest, 2.0e-2))
+    rows = [Row("compression", *line, "independent") for line in found]
+    error = float(np.max(np.abs(history["energy_error"])))
+    rows.append(
+        Row("compression", "largest energy_error", "1", 0.0, error, 1.0e-3, "closed form", 1.0)
+    )
+    bands = measure_band(result, strain=0.010)
+    at_end = measure_band(result, strain=0.013)
+    for label, band, low, high in (
+        ("weaker over stronger band at 1 %: X", bands, 0.25, 0.40),
+        ("weaker over stronger band at 1.3 %: one band", at_end, 0.0, 0.25),
+    ):
+        middle, half = 0.5 * (low + high), 0.5 * (high - low)
+        rows.append(
+            Row("compression", label, "1", middle, band.bands.ratio, half, "independent", scale=1.0)
+        )
+    rows.append(
+        Row(
+            "compression",
+            "angle of the prevailing band at 1 %",
+            "degrees",
+            45.0,
+            bands.bands.prevailing.angle,
+            7.0e-2,
+            "paper",
+        )
+    )
+    return rows
+
+
+def perfect() -> list[Row]:
+    """The perfect specimen: X at 1 %, then whichever band round-off favours."""
+    result = shipped("compression_perfect")
+    last = result.last_frame
+    largest = float(np.max(last["plastic_strain"][result.body]))
+    ratio = measure_band(result, strain=0.010).bands.ratio
+    return [
+        Row(
+            "perfect",
+            "largest alpha at 1.6 %, perfect",
+            "1",
+            0.2875,
+            largest,
+            0.0175,
+            "independent",
+            scale=1.0,
+        ),
+        Row(
+            "perfect",
+            "weaker over stronger band at 1 %, perfect: X",
+            "1",
+            0.625,
+            ratio,
+            0.375,
+            "independent",
+            scale=1.0,
+        ),
+    ]
+
+
+CASES: dict[str, Callable[[], list[Row]]] = {
+    "modulus": moduli,
+    "elastic": uniaxial,
+    "plateau": plateau,
+    "softening": softening,
+    "cyclic": cyclic,
+    "wave": wave,
+    "compression": compression,
+    "perfect": perfect,
+}
+
+
+def table(rows: list[Row]) -> list[list[str]]:
+    """The rows as text."""
+    lines = [["quantity", "unit", "exact", "computed", "error", "tolerance", "verdict", "from"]]
+    for row in rows:
+        lines.append(
+            [
+                row.quantity,
+                row.unit,
+                f"{row.exact:.5g}",
+                f"{row.computed:.5g}",
+                f"{100.0 * row.error:+.3f} %",
+                f"{100.0 * row.tolerance:.2g} %",
+                "ok" if row.passed else "FAILED",
+                row.source,
+            ]
+        )
+    return lines
+
+
+def print_table(rows: list[Row]) -> None:
+    lines = table(rows)
+    widths = [max(len(line[k]) for line in lines) for k in range(len(lines[0]))]
+    for line in lines:
+        print("  ".join(text.ljust(width) for text, width in zip(line, widths)).rstrip())
+
+
+def save(rows: list[Row], results: Path) -> None:
+    """verify.json for programs, verify.md for doc/verification.md."""
+    results.mkdir(parents=True, exist_ok=True)
+    data = [vars(row) | {"error": row.error, "passed": row.passed} for row in rows]
+    (results / "verify.json").write_text(json.dumps(data, indent=1) + "\n")
+    lines = table(rows)
+    lines.insert(1, ["---"] * len(lines[0]))
+    version = subprocess.run([str(PROGRAM), "--version"], capture_output=True, text=True, check=True)
+    text = [f"Printed by `make verify`, {version.stdout.strip()}, {platform.machine()}, "]
+    text[0] += f"{date.today().isoformat()}:\n"
+    text += ["| " + " | ".join(line) + " |" for line in lines]
+    (results / "verify.md").write_text("\n".join(text) + "\n")
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("cases", nargs="*", metavar="CASE", help="only these cases")
+    parser.add_argument("--list", action="store_true", help="list the cases")
+    arguments = parser.parse_args()
+    unknown = set(arguments.cases) - set(CASES)
+    if arguments.list or unknown:
+        print("cases:", ", ".join(CASES))
+        return 1 if unknown else 0
+    wanted = arguments.cases or list(CASES)
+    rows: list[Row] = []
+    failures: list[str] = []
+    with ThreadPoolExecutor(max_workers=os.cpu_count()) as pool:
+        jobs = {name: pool.submit(CASES[name]) for name in wanted}
+        for name, job in jobs.items():
+            try:
+                rows += job.result()
+            except (PostError, RuntimeError) as problem:
+                failures.append(f"{name}: {problem}")
+    print_table(rows)
+    if not arguments.cases:
+        save(rows, RESULTS)
+    for failure in failures:
+        print("could not run:", failure, file=sys.stderr)
+    failed = len(failures) + sum(not row.passed for row in rows)
+    print(f"{len(rows) + len(failures) - failed} passed, {failed} failed")
+    return 1 if failed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
