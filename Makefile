@@ -6,8 +6,9 @@ modules := \
   pd_kinds pd_system pd_errors pd_text pd_files pd_input_types pd_state \
   pd_cursor pd_namelist pd_keys pd_input_reference pd_input_values pd_used_values \
   pd_platens pd_input_checks pd_motion_checks pd_input \
-  pd_geometry pd_cloud pd_cells pd_families pd_operators pd_kinematics pd_strain pd_j2 pd_force \
-  pd_boundary pd_verlet pd_stability pd_observe pd_schedule pd_setup pd_summary \
+  pd_geometry pd_cloud pd_cells pd_families pd_operators pd_bond_list pd_lattice pd_kinematics \
+  pd_strain pd_j2 pd_force \
+  pd_boundary pd_verlet pd_stability pd_observe pd_schedule pd_setup pd_step pd_summary \
   pd_version \
   pd_hdf5_file pd_hdf5 pd_xdmf pd_frames pd_result pd_history pd_checkpoint pd_progress \
   pd_record pd_command_line perigeo
@@ -27,7 +28,8 @@ ifeq ($(BUILD),opt)
   program = bin/perigeo
   unit_flags = -O1 -g -fbacktrace
 else ifeq ($(BUILD),debug)
-  FFLAGS = -Og -g -fcheck=all -ffpe-trap=invalid,zero,overflow -finit-real=snan -fbacktrace
+  FFLAGS = -Og -g -fcheck=all,no-array-temps -ffpe-trap=invalid,zero,overflow -finit-real=snan \
+    -fbacktrace
   march  =
   program = bin/perigeo-debug
   unit_flags = $(FFLAGS)
@@ -98,7 +100,12 @@ lint:              ## compiler warnings as errors, Fortran and Python linters, l
 verify:            ## compare computed values with closed forms, printed as a table
 	@sh tools/setup.sh test
 	@$(submake) $(parallel) program
-	@$(venv)/bin/python tests/verify/verify.py
+	@$(venv)/bin/python tests/verify/verify.py $(if $(PUBLISH),--publish)
+
+bench:             ## measure the speed on this machine; PUBLISH=1: into doc/performance.md
+	@sh tools/setup.sh test
+	@$(submake) $(parallel) program build/opt/bench/machine
+	@$(venv)/bin/python tests/bench/bench.py $(if $(PUBLISH),--publish)
 
 install: program   ## copy the program to PREFIX/bin (PREFIX=/usr/local)
 	mkdir -p '$(DESTDIR)$(PREFIX)/bin'
@@ -164,6 +171,11 @@ $(build)/%.o: src/%.f90 $(build)/flags
 
 $(build)/pd_version.o: $(build)/pd_version.f90 $(build)/flags
 	$(call say,compile  $<)$(compile) -c $< -o $@
+
+# What this machine can do: memory bandwidth and arithmetic, for `make bench`.
+$(build)/bench/machine: tests/bench/machine.f90 $(build)/pd_kinds.o
+	@mkdir -p $(dir $@)
+	$(call say,link     $@)$(FC) $(flags) -I$(build) -J$(dir $@) -o $@ $^
 
 # Python is optional here: without it the program is built all the same.
 post:

@@ -66,16 +66,18 @@ contains
   pure real(wp) function integral(self, t)
     class(table_t), intent(in) :: self
     real(wp),       intent(in) :: t          !! [s]
-    real(wp) :: a, b
+    real(wp) :: a, b, rate_a
     integer  :: k
 
     integral = 0.0_wp
     a = 0.0_wp
+    rate_a = self%rate(a)
     do k = 1, size(self%times)
       if (self%times(k) <= a) cycle
       b = min(t, self%times(k))
-      integral = integral + 0.5_wp * (b - a) * (self%rate(a) + piece_end(self, k, b))
+      integral = integral + 0.5_wp * (b - a) * (rate_a + piece_end(self, k, b))
       a = b
+      rate_a = self%rates(k)
       if (a >= t) return
     end do
     integral = integral + (t - a) * self%rates(size(self%rates))
@@ -263,14 +265,15 @@ contains
       last = b >= 0.5_wp * huge(1.0_wp)
       missing = strain - nominal_strain(platens, boundaries, a)
       slope = approach(a)
-      if (missing <= 0.0_wp) then
+      if (missing <= 1.0e-12_wp * strain) then
         time = a
       else if (last) then
         if (slope > 0.0_wp) time = a + missing / slope
       else
         curvature = (approach(b) - slope) / (b - a)
         time = a + first_root(0.5_wp * curvature, slope, -missing)
-        if (time < a .or. time > b) time = -1.0_wp
+        if (time < a .or. time > b + 1.0e-6_wp * (b - a)) time = -1.0_wp
+        time = min(time, b)
       end if
       if (time >= 0.0_wp .or. last) return
       a = b
@@ -303,7 +306,8 @@ contains
 
     x = -1.0_wp
     discriminant = q**2 - 4.0_wp * p * r
-    if (discriminant < 0.0_wp) return
+    if (discriminant < -1.0e-9_wp * q**2) return   ! at the peak of a table round-off decides
+    discriminant = max(0.0_wp, discriminant)
     if (q + sqrt(discriminant) > 0.0_wp) x = -2.0_wp * r / (q + sqrt(discriminant))
   end function first_root
 

@@ -30,6 +30,7 @@ module pd_checkpoint
     character(:), allocatable :: input(:)           !! the values of the input as used
     real(wp),     allocatable :: position(:, :)     !! (n,2) [m]
     real(wp),     allocatable :: volume(:)          !! (n) [m^2]
+    integer,      allocatable :: boundary(:)        !! (n)
   end type checkpoint_t
 
   integer, parameter :: head_length = 512
@@ -136,6 +137,7 @@ contains
     call write_dataset(file, '/input', checkpoint%input, errors)
     call write_dataset(file, '/position', checkpoint%position, errors)
     call write_dataset(file, '/volume', checkpoint%volume, errors)
+    call write_dataset(file, '/boundary', checkpoint%boundary, errors)
   end subroutine write_numbers
 
   subroutine write_state(file, state, errors)
@@ -190,6 +192,7 @@ contains
     call read_dataset(file, '/input', checkpoint%input, errors)
     call read_dataset(file, '/position', checkpoint%position, errors)
     call read_dataset(file, '/volume', checkpoint%volume, errors)
+    call read_dataset(file, '/boundary', checkpoint%boundary, errors)
   end subroutine read_numbers
 
   subroutine read_state(file, state, errors)

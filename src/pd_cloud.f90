@@ -7,6 +7,7 @@ module pd_cloud
   use pd_errors, only: error_list_t
   use pd_geometry, only: body_t
   use pd_kinds, only: wp
+  use pd_text, only: read_number
   implicit none
   private
 
@@ -56,6 +57,9 @@ contains
         body%n = i
         allocate (body%position(i, 2), body%volume(i), source=0.0_wp)
         allocate (body%boundary(i), source=0)
+        allocate (body%points(i))
+        body%points = [(status, status=1, i)]
+        status = iostat_end
       end if
     end do
     close (unit)
@@ -65,17 +69,17 @@ contains
 
     !> The end of a line that is too long; only a comment may be lost with it.
     subroutine skip_the_rest()
-      integer :: ignored
+      integer :: rest
 
-      read (unit, '(a)', iostat=ignored)
-      if (index(line, '#') == 0) line = 'the line is too long'
+      read (unit, '(a)', iostat=rest)
+      if (rest > 0 .or. index(line, '#') == 0) line = 'the line is too long'
     end subroutine skip_the_rest
 
   end subroutine read_cloud
 
   !> Remove a comment, tabs, commas and carriage returns.
   pure subroutine strip(line)
-    character(*), intent(inout) :: line
+    character(longest_line), intent(inout) :: line
     integer :: k
 
     k = index(line, '#')
@@ -95,20 +99,21 @@ contains
     type(error_list_t), intent(inout) :: errors
     character(64) :: words(5)
     character(32) :: where
+    character(:), allocatable :: problem
     real(wp)      :: values(3)
     integer       :: k, status, n_words
 
     write (where, '(a,i0)') ', line ', n_lines
     words = ''
+    ! a right line ends before its fifth word: status < 0
     read (line, *, iostat=status) words
     n_words = count(words /= '')
     values = 0.0_wp
-    status = merge(0, 1, n_words == 3 .or. n_words == 4)
+    status = merge(0, 1, status < 0 .and. (n_words == 3 .or. n_words == 4))
     if (scan(line, '/*;''"') > 0) status = 1   ! they mean something to a list-directed read
     do k = 1, 3
-      if (status == 0) read (words(k), *, iostat=status) values(k)
-      if (status == 0 .and. .not. abs(values(k)) <= 0.01_wp * huge(1.0_wp)) status = 1
-      if (verify(trim(words(k)), '0123456789+-.eEdD') > 0) status = 1
+      call read_number(trim(words(k)), values(k), problem)
+      if (problem /= '') status = 1
     end do
     if (status /= 0) then
       call complain('a point cannot be read', trim(line), 'x y volume [boundary]')

@@ -91,7 +91,8 @@ contains
       if (verify(value, '0123456789') == 0 .and. len(value) < 9) &
         read (value, *, iostat=status) threads
       if (status /= 0 .or. threads < 1 .or. threads > most_threads) &
-        call errors%add('the number of threads is wrong', '--threads', '"'//value//'"', '1 to 4096')
+        call errors%add('the number of threads is wrong', '--threads', '"'//value//'"', &
+          '1 to 4096')
     end subroutine read_threads
 
   end subroutine read_command_line
@@ -130,8 +131,8 @@ contains
   !> The text of --help.
   subroutine print_help()
     character(*), parameter :: text(*) = [character(96) :: &
-      'perigeo: peridynamics for geomaterials. Shows where soil fails: plane strain, J2 plasticity', &
-      'with softening, non-ordinary state-based peridynamics.', &
+      'perigeo: peridynamics for geomaterials. Shows where soil fails: plane strain,', &
+      'J2 plasticity with softening, non-ordinary state-based peridynamics.', &
       '', &
       'usage: perigeo [options] RUN.nml', &
       '', &

@@ -3,12 +3,12 @@
 !>
 !> Source: doc/theory.md, sections 2 to 5.
 module pd_force
-  use pd_j2, only: elastic_stress, inner, j2_history_t, j2_t, radial_return
+  use pd_j2, only: elastic_stress_block, j2_t, stress_block
   use pd_kinds, only: n_block, pi, wp
   use pd_kinematics, only: deformation_gradient
   use pd_operators, only: operators_t
   use pd_state, only: state_t
-  use pd_strain, only: determinant, first_piola, green_lagrange
+  use pd_strain, only: determinant, force_state_block, green_lagrange_block, small_strain_block
   implicit none
   private
 
@@ -30,7 +30,7 @@ contains
     real(wp), intent(in) :: factor            !! g
     real(wp), intent(in) :: youngs_modulus    !! E [Pa]
     real(wp), intent(in) :: delta             !! horizon [m]
-    real(wp), intent(in) :: weight_sum(:)     !! W (n) [m^2]
+    real(wp), intent(in), contiguous :: weight_sum(:)     !! W (n) [m^2]
     real(wp) :: c(size(weight_sum))           !! (n) [N/m^6]
 
     c = factor * 48.0_wp * youngs_modulus / (5.0_wp * pi * delta**2) / weight_sum
@@ -42,9 +42,9 @@ contains
   !> `failed`: 0, or the first point whose det F is not positive (NaN included).
   subroutine force_state(solid, volume, state, a, dissipated, failed)
     type(solid_t), intent(in)    :: solid
-    real(wp),      intent(in)    :: volume(:)    !! V (n) [m^2]
+    real(wp),      intent(in), contiguous :: volume(:)    !! V (n) [m^2]
     type(state_t), intent(inout) :: state
-    real(wp),      intent(out)   :: a(:, :)      !! A (n,4) xx xy yx yy [N/m^6]
+    real(wp),      intent(out), contiguous :: a(:, :)      !! A (n,4) xx xy yx yy [N/m^6]
     real(wp),      intent(out)   :: dissipated   !! [J/m]
     integer,       intent(out)   :: failed
     real(wp), allocatable :: dissipated_in(:)
@@ -72,57 +72,44 @@ contains
   pure subroutine force_state_of_block(lo, hi, solid, volume, state, a, dissipated, failed)
     integer,       intent(in)    :: lo, hi
     type(solid_t), intent(in)    :: solid
-    real(wp),      intent(in)    :: volume(:)
+    real(wp),      intent(in), contiguous :: volume(:)
     type(state_t), intent(inout) :: state
-    real(wp),      intent(inout) :: a(:, :)
+    real(wp),      intent(inout), contiguous :: a(:, :)
     real(wp),      intent(out)   :: dissipated
     integer,       intent(out)   :: failed
-    type(j2_history_t) :: history
-    real(wp) :: f(4), stress(4), stress_n(4), alpha_n, plastic_strain_n(4)
+    real(wp) :: strain(n_block, 4)
     integer  :: i
 
     dissipated = 0.0_wp
-    failed = 0
-    do i = lo, hi
-      f = state%deformation_gradient(i, :)
-      if (.not. determinant(f) > 0.0_wp) then
-        if (failed == 0) failed = i
-        a(i, :) = 0.0_wp
-        cycle
-      end if
-      history%plastic_strain = state%plastic_strain(i, :)
-      history%back_stress = state%back_stress(i, :)
-      history%alpha = state%alpha(i)
-      alpha_n = history%alpha
-      call radial_return(solid%material, solid%yield_stress(i), green_lagrange(f), history, stress)
-      if (history%alpha > alpha_n) then
-        stress_n = state%stress(i, :)
-        plastic_strain_n = state%plastic_strain(i, :)
-        dissipated = dissipated + volume(i) * 0.5_wp &
-          * inner(stress_n + stress, history%plastic_strain - plastic_strain_n)
-        state%plastic_strain(i, :) = history%plastic_strain
-        state%back_stress(i, :) = history%back_stress
-        state%alpha(i) = history%alpha
-      end if
-      state%stress(i, :) = stress
-      a(i, :) = times_inverse(first_piola(f, stress), solid%k_inverse(i, :))
-    end do
+    failed = first_inverted(lo, hi, state%deformation_gradient)
+    if (failed > 0) return
+    call green_lagrange_block(lo, hi, state%deformation_gradient, strain)
+    call stress_block(solid%material, lo, hi, solid%yield_stress, volume, strain, state, &
+      dissipated)
+    call force_state_block(lo, hi, state%deformation_gradient, state%stress, solid%k_inverse, a)
     if (.not. allocated(solid%control)) return
     do i = lo, hi
       call subtract_affine_control(solid%control(i), state%deformation_gradient(i, :), a(i, :))
     end do
   end subroutine force_state_of_block
 
-  !> P K^-1 with K^-1 as xx yy xy.
-  pure function times_inverse(p, k) result(a)
-    real(wp), intent(in) :: p(4), k(3)
-    real(wp) :: a(4)
+  !> The first of the points lo to hi whose det F is not positive (NaN included); 0: none.
+  pure integer function first_inverted(lo, hi, f) result(point)
+    integer,  intent(in) :: lo, hi
+    real(wp), intent(in), contiguous :: f(:, :)   !! F (n,4)
+    integer :: i, n_bad
 
-    a(1) = p(1) * k(1) + p(2) * k(3)
-    a(2) = p(1) * k(3) + p(2) * k(2)
-    a(3) = p(3) * k(1) + p(4) * k(3)
-    a(4) = p(3) * k(3) + p(4) * k(2)
-  end function times_inverse
+    n_bad = 0
+    !$omp simd reduction(+:n_bad)
+    do i = lo, hi
+      if (.not. f(i, 1) * f(i, 4) - f(i, 2) * f(i, 3) > 0.0_wp) n_bad = n_bad + 1
+    end do
+    point = 0
+    if (n_bad == 0) return
+    do i = hi, lo, -1
+      if (.not. determinant(f(i, :)) > 0.0_wp) point = i
+    end do
+  end function first_inverted
 
   !> A <- A - c (F - I).
   pure subroutine subtract_affine_control(c, f, a)
@@ -137,33 +124,51 @@ contains
   !> Internal force of a small displacement of the unloaded elastic body: the linearised
   !> operator, control included.
   subroutine linear_force(operators, solid, u, h, a, f)
-    type(operators_t), intent(in)    :: operators
+    class(operators_t), intent(in)    :: operators
     type(solid_t),     intent(in)    :: solid
-    real(wp),          intent(in)    :: u(:, :)   !! (n,2) [m]
-    real(wp),          intent(inout) :: h(:, :)   !! work space (n,4)
-    real(wp),          intent(inout) :: a(:, :)   !! work space (n,4)
-    real(wp),          intent(out)   :: f(:, :)   !! (n,2) [N/m^3]
-    integer  :: i, lo, n
-    real(wp) :: strain(4), stress(4)
+    real(wp),          intent(in), contiguous :: u(:, :)   !! (n,2) [m]
+    real(wp),          intent(inout), contiguous :: h(:, :)   !! work space (n,4)
+    real(wp),          intent(inout), contiguous :: a(:, :)   !! work space (n,4)
+    real(wp),          intent(out), contiguous :: f(:, :)   !! (n,2) [N/m^3]
+    integer :: lo, n
 
     n = operators%n
     call operators%gradient(u, h)
     call deformation_gradient(solid%k_inverse, h)
-    !$omp parallel do schedule(static) default(none) shared(n, solid, h, a) &
-    !$omp private(i, lo, strain, stress)
+    !$omp parallel do schedule(static) default(none) shared(n, solid, h, a) private(lo)
     do lo = 1, n, n_block
-      do i = lo, min(lo + n_block - 1, n)
-        strain = [h(i, 1) - 1.0_wp, h(i, 4) - 1.0_wp, 0.0_wp, 0.5_wp * (h(i, 2) + h(i, 3))]
-        stress = elastic_stress(solid%material, strain)
-        a(i, :) = times_inverse([stress(1), stress(4), stress(4), stress(2)], &
-          solid%k_inverse(i, :))
-        if (allocated(solid%control)) &
-          call subtract_affine_control(solid%control(i), h(i, :), a(i, :))
-      end do
+      call linear_force_state_block(lo, min(lo + n_block - 1, n), solid, h, a)
     end do
     !$omp end parallel do
     call operators%divergence(a, f)
     if (allocated(solid%control)) call operators%add_control(solid%control, u, f)
   end subroutine linear_force
+
+  !> A of a small displacement of points lo to hi, from F.
+  pure subroutine linear_force_state_block(lo, hi, solid, f, a)
+    integer,       intent(in) :: lo, hi
+    type(solid_t), intent(in) :: solid
+    real(wp),      intent(in),    contiguous :: f(:, :)   !! F (n,4) xx xy yx yy
+    real(wp),      intent(inout), contiguous :: a(:, :)   !! A (n,4) xx xy yx yy [N/m^6]
+    real(wp) :: strain(n_block, 4), stress(n_block, 4)
+    integer  :: i, b
+
+    call small_strain_block(lo, hi, f, strain)
+    call elastic_stress_block(solid%material, hi - lo + 1, strain, stress)
+    associate (k => solid%k_inverse)
+      !$omp simd private(b)
+      do i = lo, hi
+        b = i - lo + 1
+        a(i, 1) = stress(b, 1) * k(i, 1) + stress(b, 4) * k(i, 3)
+        a(i, 2) = stress(b, 1) * k(i, 3) + stress(b, 4) * k(i, 2)
+        a(i, 3) = stress(b, 4) * k(i, 1) + stress(b, 2) * k(i, 3)
+        a(i, 4) = stress(b, 4) * k(i, 3) + stress(b, 2) * k(i, 2)
+      end do
+    end associate
+    if (.not. allocated(solid%control)) return
+    do i = lo, hi
+      call subtract_affine_control(solid%control(i), f(i, :), a(i, :))
+    end do
+  end subroutine linear_force_state_block
 
 end module pd_force

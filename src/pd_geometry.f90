@@ -12,10 +12,14 @@ module pd_geometry
 
   !> Reference points in the order of the rows of the lattice (y slow, x fast), or of the file.
   type :: body_t
-    integer :: n = 0                            !! points, fictitious ones included
+    integer :: n = 0                            !! points, fictitious ones and voids included
     real(wp), allocatable :: position(:, :)     !! X (n,2) [m]
     real(wp), allocatable :: volume(:)          !! V (n) per unit thickness [m^2]
-    integer,  allocatable :: boundary(:)        !! 0: body, k: fictitious point of boundary k (n)
+    integer,  allocatable :: boundary(:)        !! 0: body, k: fictitious point of boundary k (n),
+                                                !! -1: void: a place of a lattice without a point
+    integer,  allocatable :: points(:)          !! the places that hold a point, ascending
+    integer :: stride = 0                       !! places from a row of a lattice to the next, 0:
+                                                !! no lattice
     real(wp) :: lower(2) = 0.0_wp               !! corners of the extent of the body without
     real(wp) :: upper(2) = 0.0_wp               !! fictitious points, as used [m]
   end type body_t
@@ -26,6 +30,7 @@ module pd_geometry
     logical  :: cells                           !! points at cell centres, else on the boundary
     logical  :: tributary                       !! each point owns its own part of the area
     integer  :: rows                            !! thickness of fictitious layers in points
+    logical  :: with_voids = .false.            !! number the empty places of the box as well
   end type lattice_t
 
   !> Fictitious points beyond one side.
@@ -69,7 +74,7 @@ contains
 
     do k = 1, size(lower, 2)
       first(:, k) = nearest_count(lower(:, k) - lower(:, 1), lattice%spacing)
-      last(:, k) = first(:, k) + nearest_count(upper(:, k) - lower(:, k), lattice%spacing)
+      last(:, k) = nearest_count(upper(:, k) - lower(:, 1), lattice%spacing)
       if (any(last(:, k) <= first(:, k))) then
         call errors%add('a body is thinner than one spacing', '&body')
         return
@@ -192,23 +197,35 @@ contains
 
   end subroutine fill_layer
 
-  !> Number the occupied places row by row and give them positions and volumes.
+  !> Number the places row by row and give them positions and volumes: the occupied ones, or with
+  !> voids all of the box and a margin, so that a shift by a horizon never leaves the fields.
   subroutine number_points(places, origin, lattice, body)
     type(places_t),  intent(in)    :: places
     real(wp),        intent(in)    :: origin(2)
     type(lattice_t), intent(in)    :: lattice
     type(body_t),    intent(inout) :: body
-    integer  :: ix, iy, i, quarters
+    integer  :: ix, iy, i, k, quarters, low(2), high(2)
     real(wp) :: offset
 
+    call occupied_box(places, low, high)
     body%n = count(places%owner /= void)
-    allocate (body%position(body%n, 2), body%volume(body%n), body%boundary(body%n))
+    allocate (body%points(body%n))
+    if (lattice%with_voids) then
+      body%stride = high(1) - low(1) + 1 + lattice%rows
+      body%n = body%stride * (high(2) - low(2) + 1 + 2 * lattice%rows) + 2 * lattice%rows
+    end if
+    allocate (body%position(body%n, 2), body%volume(body%n), source=0.0_wp)
+    allocate (body%boundary(body%n), source=void)
     offset = merge(0.5_wp, 0.0_wp, lattice%cells)
-    i = 0
-    do iy = lbound(places%owner, 2), ubound(places%owner, 2)
-      do ix = lbound(places%owner, 1), ubound(places%owner, 1)
+    k = 0
+    do iy = low(2), high(2)
+      do ix = low(1), high(1)
         if (places%owner(ix, iy) == void) cycle
-        i = i + 1
+        k = k + 1
+        i = k
+        if (lattice%with_voids) i = lattice%rows + 1 + ix - low(1) &
+          + body%stride * (iy - low(2) + lattice%rows)
+        body%points(k) = i
         body%position(i, :) = origin + (real([ix, iy], wp) + offset) * lattice%spacing
         body%boundary(i) = places%owner(ix, iy)
         quarters = 4
@@ -218,5 +235,38 @@ contains
       end do
     end do
   end subroutine number_points
+
+  !> Lowest and highest column and row that hold a point.
+  pure subroutine occupied_box(places, low, high)
+    type(places_t), intent(in)  :: places
+    integer,        intent(out) :: low(2), high(2)
+    integer :: k, line(2)
+
+    do k = 1, 2
+      line = [lbound(places%owner, k), ubound(places%owner, k)]
+      low(k) = line(1)
+      do while (low(k) < line(2))
+        if (holds_points(places, k, low(k))) exit
+        low(k) = low(k) + 1
+      end do
+      high(k) = line(2)
+      do while (high(k) > low(k))
+        if (holds_points(places, k, high(k))) exit
+        high(k) = high(k) - 1
+      end do
+    end do
+  end subroutine occupied_box
+
+  !> Whether a column (axis 1) or row (axis 2) holds a point.
+  pure logical function holds_points(places, axis, line)
+    type(places_t), intent(in) :: places
+    integer,        intent(in) :: axis, line
+
+    if (axis == 1) then
+      holds_points = any(places%owner(line, :) /= void)
+    else
+      holds_points = any(places%owner(:, line) /= void)
+    end if
+  end function holds_points
 
 end module pd_geometry

@@ -75,6 +75,7 @@ contains
     call take_text(group, 'name', input%run%name)
     call take_text(group, 'title', input%run%title)
     call take_text(group, 'output_dir', input%run%output_dir)
+    call take_text(group, 'operators', input%run%operators)
     if (.not. is_given(group, 'title')) input%run%title = input%run%name
     if (.not. is_given(group, 'output_dir')) input%run%output_dir = 'results/'//input%run%name
   end subroutine fill_run

@@ -136,6 +136,10 @@ contains
         end do
         call add_useless(group, 'file', 'on a rectangle', errors)
       else if (b%shape == 'file') then
+        if (input%run%operators == 'lattice') call errors%add( &
+          'a point cloud has no lattice', &
+          where='&run operators', &
+          found='lattice', allowed='auto or list')
         if (size(input%bodies) > 1) call errors%add('a point cloud beside another body', &
           where=place_of(group, 'shape'), found=integer_text(size(input%bodies))//' bodies', &
           allowed='rectangles only, or one point cloud alone')
@@ -254,10 +258,25 @@ contains
     do k = 1, size(input%bodies)
       points = points + points_of(input%bodies(k), input%discretisation%spacing)
     end do
-    if (points > max_points) call errors%add('the bodies would have too many points', &
+    if (size(input%bodies) > 0) &
+      points = max(points, points_of(hull(input%bodies), input%discretisation%spacing))
+    if (points > max_points) call errors%add( &
+      'the bodies, or the box around them, would have too many points', &
       where=place_of(group_named(groups, 'discretisation', 1, input%path), 'spacing'), &
       found='about '//number_text(rounded(points)), allowed='at most 1e8')
   end subroutine check_number_of_points
+
+  !> The rectangle around all rectangles.
+  pure function hull(bodies) result(box)
+    type(body_input_t), intent(in) :: bodies(:)
+    type(body_input_t) :: box
+
+    box = bodies(1)
+    box%x_min = minval(bodies%x_min)
+    box%y_min = minval(bodies%y_min)
+    box%x_max = maxval(bodies%x_max)
+    box%y_max = maxval(bodies%y_max)
+  end function hull
 
   !> About how many points a rectangle has; 0 for anything else.
   pure real(wp) function points_of(body, spacing)

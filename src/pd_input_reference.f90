@@ -158,6 +158,8 @@ contains
       call put(unit, 'Frame 0, the unloaded state, is always written; requests come after it.')
       call put(unit, 'They never change the time step: a frame or row is taken at the first')
       call put(unit, 'step at or past its request.')
+    case default   ! the table says it all
+      continue
     end select
   end subroutine write_note
 
@@ -179,7 +181,9 @@ contains
     call put(unit, '- affinely (`contact = ''affine''`): v = L x about the origin of the')
     call put(unit, '  coordinates, with x the reference position and L the')
     call put(unit, '  `velocity_gradient`, times the table `factors` at `times` where these')
-    call put(unit, '  are given. On all sides this is a homogeneous deformation.')
+    call put(unit, '  are given. A single point between layers on all sides deforms')
+    call put(unit, '  homogeneously; in a larger body points near the layers deviate, for the')
+    call put(unit, '  layers are cut off at their outer side.')
     call put(unit, '')
     call put(unit, '**Platens** are exactly two boundaries on opposite sides (bottom and')
     call put(unit, 'top, or left and right), neither of them affine, with no boundary on the')

@@ -13,6 +13,7 @@ module pd_input_types
 
   type :: run_input_t
     character(:), allocatable :: title, name, output_dir
+    character(:), allocatable :: operators              !! auto, lattice or list
   end type run_input_t
 
   type :: discretisation_input_t

@@ -4,11 +4,13 @@
 !> Symmetric tensors: xx yy zz xy. Source: doc/theory.md, section 3; Simo & Hughes (1998),
 !> chapter 3.
 module pd_j2
-  use pd_kinds, only: wp
+  use pd_kinds, only: n_block, wp
+  use pd_state, only: state_t
   implicit none
   private
 
-  public :: j2_t, j2_history_t, new_j2, elastic_stress, radial_return, elastic_energy
+  public :: j2_t, j2_history_t, new_j2, elastic_stress, radial_return, stress_block, elastic_energy
+  public :: elastic_stress_block, elastic_energy_block
   public :: deviator, norm, inner, von_mises
 
   !> Material constants [Pa]; the yield stress belongs to the point (it may carry a flaw).
@@ -28,6 +30,17 @@ module pd_j2
     real(wp) :: alpha = 0.0_wp             !! equivalent plastic strain
   end type j2_history_t
 
+  !> Points that yield, gathered from a block: the loops over them run with unit stride.
+  type :: yielding_t
+    real(wp) :: yield_stress(n_block)         !! sigma_y0 [Pa]
+    real(wp) :: stress(n_block, 4)            !! S* -> S [Pa]
+    real(wp) :: plastic_strain(n_block, 4)    !! E^p
+    real(wp) :: back_stress(n_block, 4)       !! beta [Pa]
+    real(wp) :: alpha(n_block)                !! equivalent plastic strain
+  end type yielding_t
+
+  real(wp), parameter :: tiny_modulus = 1.0e-30_wp   !! keeps quotients finite that are not used
+  real(wp), parameter :: far = 1.0e100_wp            !! a plastic increment that never comes
   real(wp), parameter :: root_3_2 = sqrt(1.5_wp), root_2_3 = sqrt(2.0_wp / 3.0_wp)
 
 contains
@@ -54,6 +67,27 @@ contains
     stress(1:3) = stress(1:3) + pressure_part
   end function elastic_stress
 
+  !> The same for n points.
+  pure subroutine elastic_stress_block(material, n, strain, stress)
+    type(j2_t), intent(in) :: material
+    integer,    intent(in) :: n
+    real(wp),   intent(in),    contiguous :: strain(:, :)   !! (n,4)
+    real(wp),   intent(inout), contiguous :: stress(:, :)   !! (n,4) [Pa]
+    real(wp) :: g2, lambda, pressure_part
+    integer  :: i
+
+    g2 = 2.0_wp * material%shear_modulus
+    lambda = material%lambda
+    !$omp simd private(pressure_part)
+    do i = 1, n
+      pressure_part = lambda * (strain(i, 1) + strain(i, 2) + strain(i, 3))
+      stress(i, 1) = g2 * strain(i, 1) + pressure_part
+      stress(i, 2) = g2 * strain(i, 2) + pressure_part
+      stress(i, 3) = g2 * strain(i, 3) + pressure_part
+      stress(i, 4) = g2 * strain(i, 4)
+    end do
+  end subroutine elastic_stress_block
+
   !> Stored elastic energy per volume, (1/2) E^e : C : E^e, of a stress.
   pure real(wp) function elastic_energy(material, stress) result(energy)
     type(j2_t), intent(in) :: material
@@ -66,7 +100,50 @@ contains
       / (4.0_wp * material%shear_modulus)
   end function elastic_energy
 
+  !> The same for points lo to hi.
+  pure subroutine elastic_energy_block(material, lo, hi, stress, energy)
+    type(j2_t), intent(in) :: material
+    integer,    intent(in) :: lo, hi
+    real(wp),   intent(in),    contiguous :: stress(:, :)   !! S (n,4) [Pa]
+    real(wp),   intent(inout), contiguous :: energy(:)      !! [J/m^3]; row 1 is point lo
+    real(wp) :: over_4g, share, trace
+    integer  :: i
+
+    over_4g = 0.25_wp / material%shear_modulus
+    share = material%lambda / (3.0_wp * material%lambda + 2.0_wp * material%shear_modulus)
+    !$omp simd private(trace)
+    do i = lo, hi
+      trace = stress(i, 1) + stress(i, 2) + stress(i, 3)
+      energy(i - lo + 1) = over_4g * (stress(i, 1)**2 + stress(i, 2)**2 + stress(i, 3)**2 &
+        + 2.0_wp * stress(i, 4)**2 - share * trace**2)
+    end do
+  end subroutine elastic_energy_block
+
   !> Stress at a strain, and the history n -> n+1.
+  pure subroutine radial_return(material, yield_stress, strain, history, stress)
+    type(j2_t), intent(in)            :: material
+    real(wp),   intent(in)            :: yield_stress  !! sigma_y0 of this point [Pa]
+    real(wp),   intent(in)            :: strain(4)     !! E
+    type(j2_history_t), intent(inout) :: history
+    real(wp),   intent(out)           :: stress(4)     !! S [Pa]
+    type(yielding_t) :: point
+    real(wp) :: strength
+
+    stress = elastic_stress(material, strain - history%plastic_strain)
+    if (.not. material%plastic) return
+    strength = strength_now(material, yield_stress, history%alpha)
+    if (root_3_2 * norm(deviator(stress) - history%back_stress) <= strength) return
+    point%yield_stress(1) = yield_stress
+    point%stress(1, :) = stress
+    point%plastic_strain(1, :) = history%plastic_strain
+    point%back_stress(1, :) = history%back_stress
+    point%alpha(1) = history%alpha
+    call return_to_surface(material, 1, point)
+    stress = point%stress(1, :)
+    history = j2_history_t(point%plastic_strain(1, :), point%back_stress(1, :), point%alpha(1))
+  end subroutine radial_return
+
+  !> Return the trial stresses of n yielding points to the yield surface.
   !>
   !>   f = sqrt(3/2)|eta*| - sigma_y(alpha),  da = f / (3 G + H_k + H_i)
   !>
@@ -74,51 +151,304 @@ contains
   !> up to the nearest bound, then what is left with the modulus that still acts.
   !> Errors: none: every trial state has exactly one answer (3 G + H_k + H_i > 0, and with two
   !> negative moduli 3 G + H_i + min(H_k, H_i) > 0).
-  pure subroutine radial_return(material, yield_stress, strain, history, stress)
-    type(j2_t), intent(in)            :: material
-    real(wp),   intent(in)            :: yield_stress  !! sigma_y0 of this point [Pa]
-    real(wp),   intent(in)            :: strain(4)     !! E
-    type(j2_history_t), intent(inout) :: history
-    real(wp),   intent(out)           :: stress(4)     !! S [Pa]
-    real(wp) :: eta(4), n(4), beta(4), s_trial(4), s(4)
-    real(wp) :: q, f, g3, strength, da, first, modulus
+  pure subroutine return_to_surface(material, n, points)
+    type(j2_t),       intent(in)    :: material
+    integer,          intent(in)    :: n
+    type(yielding_t), intent(inout) :: points
+    real(wp) :: flow(n_block, 4)   !! direction of the flow, of length 1
+    real(wp) :: deviator_trial(n_block, 4), first(n_block), da(n_block), q(n_block)
+    real(wp) :: direction(4), beta(4), rest
+    integer  :: i
 
-    stress = elastic_stress(material, strain - history%plastic_strain)
-    if (.not. material%plastic) return
-    s_trial = deviator(stress)
-    eta = s_trial - history%back_stress
-    q = root_3_2 * norm(eta)
-    strength = strength_now(material, yield_stress, history%alpha)
-    f = q - strength
-    if (f <= 0.0_wp) return
+    call flow_directions(n, points, deviator_trial, q, flow)
+    call increments(material, n, points, q, flow, first, da)
+    call move_back_stress(material, n, flow, first, da, points)
+    if (both_soften(material)) then
+      do i = 1, n
+        if (first(i) >= da(i)) cycle
+        direction = flow(i, :)
+        beta = points%back_stress(i, :)
+        call shrink_to_residual(material, &
+          q(i) - (3.0_wp * material%shear_modulus + material%kinematic_modulus) * first(i), &
+          strength_now(material, points%yield_stress(i), points%alpha(i) + first(i)), &
+          direction, beta, rest)
+        flow(i, :) = direction
+        points%back_stress(i, :) = beta
+        da(i) = first(i) + rest
+      end do
+    end if
+    call update_points(material, n, flow, deviator_trial, da, points)
+  end subroutine return_to_surface
+
+  !> Whether both moduli are negative.
+  pure logical function both_soften(material)
+    type(j2_t), intent(in) :: material
+
+    both_soften = material%kinematic_modulus < 0.0_wp .and. material%isotropic_modulus < 0.0_wp
+  end function both_soften
+
+  !> dev S*, q* = sqrt(3/2)|eta*| and eta* / |eta*|.
+  pure subroutine flow_directions(n, points, s, q, flow)
+    integer,          intent(in)  :: n
+    type(yielding_t), intent(in)  :: points
+    real(wp),         intent(out) :: s(n_block, 4), q(n_block), flow(n_block, 4)
+    real(wp) :: mean, exx, eyy, ezz, exy, length
+    integer  :: i
+
+    !$omp simd private(mean, exx, eyy, ezz, exy, length)
+    do i = 1, n
+      mean = (points%stress(i, 1) + points%stress(i, 2) + points%stress(i, 3)) / 3.0_wp
+      s(i, 1) = points%stress(i, 1) - mean
+      s(i, 2) = points%stress(i, 2) - mean
+      s(i, 3) = points%stress(i, 3) - mean
+      s(i, 4) = points%stress(i, 4)
+      exx = s(i, 1) - points%back_stress(i, 1)
+      eyy = s(i, 2) - points%back_stress(i, 2)
+      ezz = s(i, 3) - points%back_stress(i, 3)
+      exy = s(i, 4) - points%back_stress(i, 4)
+      length = sqrt(exx**2 + eyy**2 + ezz**2 + 2.0_wp * exy**2)
+      q(i) = root_3_2 * length
+      flow(i, 1) = exx / length
+      flow(i, 2) = eyy / length
+      flow(i, 3) = ezz / length
+      flow(i, 4) = exy / length
+    end do
+  end subroutine flow_directions
+
+  !> Plastic increments: `first` with both moduli as they are, `da` whole (where both moduli are
+  !> negative and first < da: without the rest, which `shrink_to_residual` finds).
+  !>
+  !> `first` ends where sigma_y(alpha) meets sigma_r, or where the back stress b - h da n, with
+  !> b = sqrt(3/2) beta and h = -H_k, meets its bound r - k da, k = -H_i, r = sigma_y - sigma_r
+  !> (sigma_y0 where H_i >= 0: the bound then stays): the smallest root da >= 0 of
+  !> (h^2 - k^2) da^2 - 2 (h b . n - r k) da - (r^2 - b . b) = 0, in the form that does not cancel.
+  !> Written without a branch: every quotient is finite, also where it is not used.
+  pure subroutine increments(material, n, points, q, flow, first, da)
+    type(j2_t),       intent(in)  :: material
+    integer,          intent(in)  :: n
+    type(yielding_t), intent(in)  :: points
+    real(wp),         intent(in)  :: q(n_block), flow(n_block, 4)
+    real(wp),         intent(out) :: first(n_block), da(n_block)
+    real(wp) :: g3, h, k, hi, modulus, modulus_left, residual, square, floor_strength
+    real(wp) :: strength, r, f, room, bb, bn, linear, rest, reach, over, under, left
+    real(wp) :: square_or_tiny, one_over_k, edge, no_bound, no_floor
+    integer  :: i
 
     g3 = 3.0_wp * material%shear_modulus
-    n = eta * (root_3_2 / q)
-    modulus = g3 + material%kinematic_modulus + material%isotropic_modulus
-    da = f / modulus
-    first = min(da, room_to_soften(material, yield_stress, history, strength, n))
-    beta = history%back_stress + root_2_3 * material%kinematic_modulus * first * n
-    if (first < da) then
-      f = f - modulus * first
-      if (material%isotropic_modulus >= 0.0_wp) then
-        da = first + f / (g3 + material%isotropic_modulus)
-      else if (material%kinematic_modulus >= 0.0_wp) then
-        da = first + f / (g3 + material%kinematic_modulus)
-        beta = history%back_stress + root_2_3 * material%kinematic_modulus * da * n
-      else
-        call shrink_to_residual(material, q - (g3 + material%kinematic_modulus) * first, &
-          strength + material%isotropic_modulus * first, n, beta, da)
-        da = first + da
-      end if
-    end if
+    hi = material%isotropic_modulus
+    h = max(0.0_wp, -material%kinematic_modulus)
+    k = max(0.0_wp, -hi)
+    residual = material%residual_strength
+    floor_strength = merge(residual, -huge(1.0_wp), k > 0.0_wp)
+    modulus = g3 + material%kinematic_modulus + hi
+    modulus_left = g3 + merge(material%kinematic_modulus, hi, k > 0.0_wp)
+    square = h**2 - k**2
+    one_over_k = 0.0_wp
+    if (k > 0.0_wp) one_over_k = 1.0_wp / k
+    no_floor = merge(0.0_wp, far, k > 0.0_wp)
+    square_or_tiny = merge(square, tiny_modulus, square > 0.0_wp)
+    no_bound = merge(0.0_wp, far, h > 0.0_wp)
+    edge = merge(no_bound, far, square > 0.0_wp)
+    !$omp simd private(strength, r, f, room, bb, bn, linear, rest, reach, over, under, left)
+    do i = 1, n
+      strength = max(floor_strength, points%yield_stress(i) + hi * points%alpha(i))
+      f = max(0.0_wp, q(i) - strength)
+      r = points%yield_stress(i) - k * points%alpha(i)
+      r = max(floor_strength, r) - residual
+      room = r * one_over_k + no_floor
+      bb = 1.5_wp * (points%back_stress(i, 1)**2 + points%back_stress(i, 2)**2 &
+        + points%back_stress(i, 3)**2 + 2.0_wp * points%back_stress(i, 4)**2)
+      bn = root_3_2 * (points%back_stress(i, 1) * flow(i, 1) &
+        + points%back_stress(i, 2) * flow(i, 2) + points%back_stress(i, 3) * flow(i, 3) &
+        + 2.0_wp * points%back_stress(i, 4) * flow(i, 4))
+      rest = max(0.0_wp, r**2 - bb)
+      linear = h * bn - r * k
+      reach = sqrt(max(0.0_wp, linear**2 + square * rest)) + abs(linear)
+      ! linear > 0: reach / square, else rest / reach; 0 / 0: on the bound and about to leave it
+      over = merge(reach, rest, linear > 0.0_wp)
+      under = merge(square_or_tiny, max(reach, tiny_modulus), linear > 0.0_wp)
+      room = min(room, over / under + merge(no_bound, edge, reach > 0.0_wp))
+      da(i) = f / modulus
+      first(i) = min(da(i), room)
+      f = f - modulus * first(i)
+      left = f / modulus_left
+      da(i) = merge(first(i) + left, da(i), first(i) < da(i))
+    end do
+  end subroutine increments
 
-    history%alpha = history%alpha + da
-    strength = strength_now(material, yield_stress, history%alpha)
-    s = beta + root_2_3 * strength * n
-    history%plastic_strain = history%plastic_strain + (s_trial - s) / (2.0_wp * g3 / 3.0_wp)
-    history%back_stress = beta
-    stress = stress + (s - s_trial)
-  end subroutine radial_return
+  !> beta <- beta + sqrt(2/3) H_k da n: `first` where kinematic softening ends, else all of da.
+  pure subroutine move_back_stress(material, n, flow, first, da, points)
+    type(j2_t),       intent(in)    :: material
+    integer,          intent(in)    :: n
+    real(wp),         intent(in)    :: flow(n_block, 4), first(n_block), da(n_block)
+    type(yielding_t), intent(inout) :: points
+    real(wp) :: factor, way
+    logical  :: softens
+    integer  :: i, c
+
+    factor = root_2_3 * material%kinematic_modulus
+    softens = material%kinematic_modulus < 0.0_wp
+    do c = 1, 4
+      !$omp simd private(way)
+      do i = 1, n
+        way = factor * merge(first(i), da(i), softens)
+        points%back_stress(i, c) = points%back_stress(i, c) + way * flow(i, c)
+      end do
+    end do
+  end subroutine move_back_stress
+
+  !> alpha <- alpha + da, S on the yield surface, E^p by the stress that was taken back.
+  pure subroutine update_points(material, n, flow, deviator_trial, da, points)
+    type(j2_t),       intent(in)    :: material
+    integer,          intent(in)    :: n
+    real(wp),         intent(in)    :: flow(n_block, 4), deviator_trial(n_block, 4), da(n_block)
+    type(yielding_t), intent(inout) :: points
+    real(wp) :: hi, floor_strength, radius(n_block), back, g2
+    integer  :: i, c
+
+    hi = material%isotropic_modulus
+    floor_strength = merge(material%residual_strength, -huge(1.0_wp), hi < 0.0_wp)
+    g2 = 2.0_wp * material%shear_modulus
+    !$omp simd
+    do i = 1, n
+      points%alpha(i) = points%alpha(i) + da(i)
+      radius(i) = root_2_3 * max(floor_strength, points%yield_stress(i) + hi * points%alpha(i))
+    end do
+    do c = 1, 4
+      !$omp simd private(back)
+      do i = 1, n
+        back = deviator_trial(i, c) - (points%back_stress(i, c) + radius(i) * flow(i, c))
+        points%plastic_strain(i, c) = points%plastic_strain(i, c) + back / g2
+        points%stress(i, c) = points%stress(i, c) - back
+      end do
+    end do
+  end subroutine update_points
+
+  !> Stresses of points lo to hi; the history goes from step n to n+1.
+  !>
+  !> The trial state of all points comes first; then those that yield are gathered, returned
+  !> together, and put back: no loop over points has a branch in it.
+  !> `dissipated`: work of S on dE^p of this step by the trapezoidal rule.
+  pure subroutine stress_block(material, lo, hi, yield_stress, volume, strain, state, dissipated)
+    type(j2_t),    intent(in)    :: material
+    integer,       intent(in)    :: lo, hi
+    real(wp),      intent(in),    contiguous :: yield_stress(:)  !! (n) [Pa]
+    real(wp),      intent(in),    contiguous :: volume(:)        !! V (n) [m^2]
+    real(wp),      intent(in),    contiguous :: strain(:, :)     !! E xx yy zz xy; row 1: point lo
+    type(state_t), intent(inout) :: state
+    real(wp),      intent(out)   :: dissipated                   !! [J/m]
+    type(yielding_t) :: points
+    real(wp) :: trial(n_block, 4), excess(n_block)
+    integer  :: places(n_block), n, b
+
+    call trial_block(material, lo, hi, yield_stress, strain, state%plastic_strain, &
+      state%back_stress, state%alpha, trial, excess)
+    dissipated = 0.0_wp
+    n = 0
+    if (material%plastic) then
+      do b = 1, hi - lo + 1
+        if (excess(b) <= 0.0_wp) cycle
+        n = n + 1
+        places(n) = b
+      end do
+    end if
+    if (n > 0) then
+      call gather_points(n, lo, places, yield_stress, trial, state, points)
+      call return_to_surface(material, n, points)
+      call scatter_points(n, lo, places, volume, points, trial, state, dissipated)
+    end if
+    state%stress(lo:hi, :) = trial(:hi - lo + 1, :)
+  end subroutine stress_block
+
+  !> The yielding points, one behind the other.
+  pure subroutine gather_points(n, lo, places, yield_stress, trial, state, points)
+    integer,          intent(in)  :: n, lo, places(n_block)   !! place 1: point lo
+    real(wp),         intent(in), contiguous :: yield_stress(:)
+    real(wp),         intent(in)  :: trial(n_block, 4)
+    type(state_t),    intent(in)  :: state
+    type(yielding_t), intent(out) :: points
+    integer :: k, c
+
+    do k = 1, n
+      points%yield_stress(k) = yield_stress(lo + places(k) - 1)
+      points%alpha(k) = state%alpha(lo + places(k) - 1)
+    end do
+    do c = 1, 4
+      do k = 1, n
+        points%stress(k, c) = trial(places(k), c)
+        points%plastic_strain(k, c) = state%plastic_strain(lo + places(k) - 1, c)
+        points%back_stress(k, c) = state%back_stress(lo + places(k) - 1, c)
+      end do
+    end do
+  end subroutine gather_points
+
+  !> Put the returned points back, and add up what they dissipated.
+  pure subroutine scatter_points(n, lo, places, volume, points, trial, state, dissipated)
+    integer,          intent(in)    :: n, lo, places(n_block)   !! place 1: point lo
+    real(wp),         intent(in),    contiguous :: volume(:)
+    type(yielding_t), intent(in)    :: points
+    real(wp),         intent(inout) :: trial(n_block, 4)
+    type(state_t),    intent(inout) :: state
+    real(wp),         intent(out)   :: dissipated               !! [J/m]
+    real(wp), parameter :: twice(4) = [1.0_wp, 1.0_wp, 1.0_wp, 2.0_wp]
+    integer :: i, k, c
+
+    dissipated = 0.0_wp
+    do c = 1, 4
+      do k = 1, n
+        i = lo + places(k) - 1
+        dissipated = dissipated + 0.5_wp * twice(c) * volume(i) &
+          * (state%stress(i, c) + points%stress(k, c)) &
+          * (points%plastic_strain(k, c) - state%plastic_strain(i, c))
+        trial(places(k), c) = points%stress(k, c)
+        state%plastic_strain(i, c) = points%plastic_strain(k, c)
+        state%back_stress(i, c) = points%back_stress(k, c)
+      end do
+    end do
+    do k = 1, n
+      state%alpha(lo + places(k) - 1) = points%alpha(k)
+    end do
+  end subroutine scatter_points
+
+  !> Trial stress of points lo to hi, and by how much 3/2 |eta*|^2 exceeds sigma_y^2.
+  pure subroutine trial_block(material, lo, hi, yield_stress, strain, plastic_strain, &
+    back_stress, alpha, trial, excess)
+    type(j2_t), intent(in) :: material
+    integer,    intent(in) :: lo, hi
+    real(wp),   intent(in), contiguous :: yield_stress(:), strain(:, :)
+    real(wp),   intent(in), contiguous :: plastic_strain(:, :), back_stress(:, :), alpha(:)
+    real(wp),   intent(out) :: trial(n_block, 4)   !! S* xx yy zz xy [Pa]; row 1: point lo
+    real(wp),   intent(out) :: excess(n_block)     !! [Pa^2]
+    real(wp) :: g2, lambda, floor_strength, volumetric, exx, eyy, ezz, exy, mean, strength
+    real(wp) :: etaxx, etayy, etazz, etaxy
+    integer  :: i, b
+
+    g2 = 2.0_wp * material%shear_modulus
+    lambda = material%lambda
+    floor_strength = 0.0_wp
+    if (material%isotropic_modulus < 0.0_wp) floor_strength = material%residual_strength
+    !$omp simd private(b, volumetric, exx, eyy, ezz, exy, mean, strength) &
+    !$omp private(etaxx, etayy, etazz, etaxy)
+    do i = lo, hi
+      b = i - lo + 1
+      exx = strain(b, 1) - plastic_strain(i, 1)
+      eyy = strain(b, 2) - plastic_strain(i, 2)
+      ezz = strain(b, 3) - plastic_strain(i, 3)
+      exy = strain(b, 4) - plastic_strain(i, 4)
+      volumetric = exx + eyy + ezz
+      trial(b, 1) = g2 * exx + lambda * volumetric
+      trial(b, 2) = g2 * eyy + lambda * volumetric
+      trial(b, 3) = g2 * ezz + lambda * volumetric
+      trial(b, 4) = g2 * exy
+      mean = volumetric / 3.0_wp
+      etaxx = g2 * (exx - mean) - back_stress(i, 1)
+      etayy = g2 * (eyy - mean) - back_stress(i, 2)
+      etazz = g2 * (ezz - mean) - back_stress(i, 3)
+      etaxy = g2 * exy - back_stress(i, 4)
+      strength = max(floor_strength, yield_stress(i) + material%isotropic_modulus * alpha(i))
+      excess(b) = 1.5_wp * (etaxx**2 + etayy**2 + etazz**2 + 2.0_wp * etaxy**2) - strength**2
+    end do
+  end subroutine trial_block
 
   !> sigma_y(alpha): isotropic softening ends at the residual strength, hardening has no end.
   pure real(wp) function strength_now(material, yield_stress, alpha) result(strength)
@@ -128,38 +458,6 @@ contains
     strength = yield_stress + material%isotropic_modulus * alpha
     if (material%isotropic_modulus < 0.0_wp) strength = max(strength, material%residual_strength)
   end function strength_now
-
-  !> The largest da for which both moduli act as they are: until sigma_y(alpha) meets sigma_r, or
-  !> the back stress, b + H_k da n with b = sqrt(3/2) beta, meets its bound R - |H_i| da,
-  !> R = sigma_y - sigma_r (sigma_y0 where H_i >= 0: the bound then stays).
-  pure real(wp) function room_to_soften(material, yield_stress, history, strength, n) result(room)
-    type(j2_t),         intent(in) :: material
-    real(wp),           intent(in) :: yield_stress, strength, n(4)
-    type(j2_history_t), intent(in) :: history
-    real(wp) :: b(4), r, h, k, linear, square, rest, root
-
-    room = huge(1.0_wp)
-    h = max(0.0_wp, -material%kinematic_modulus)
-    k = max(0.0_wp, -material%isotropic_modulus)
-    r = yield_stress - material%residual_strength
-    if (k > 0.0_wp) then
-      r = strength - material%residual_strength
-      room = r / k
-    end if
-    if (h <= 0.0_wp) return
-
-    ! |b - h da n|^2 = (r - k da)^2, smallest root da >= 0 of square da^2 - 2 linear da + rest = 0
-    b = root_3_2 * history%back_stress
-    rest = min(0.0_wp, inner(b, b) - r**2)
-    square = h**2 - k**2
-    linear = h * inner(b, n) - r * k
-    root = sqrt(max(0.0_wp, linear**2 - square * rest))
-    if (linear <= 0.0_wp) then
-      if (root - linear > 0.0_wp) room = min(room, -rest / (root - linear))
-    else if (square > 0.0_wp) then
-      room = min(room, (linear + root) / square)
-    end if
-  end function room_to_soften
 
   !> The rest of a return when both moduli are negative and the back stress has met its bound R.
   !>

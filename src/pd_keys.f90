@@ -114,6 +114,10 @@ contains
     call declare(list, n, key_t(group, 'output_dir', kind_text, stands_for='`results/<name>`', &
       meaning='folder of the output files, relative to the working directory; created where ' &
       //'it does not exist'))
+    call declare(list, n, key_t(group, 'operators', kind_text, default='auto', &
+      choices='auto lattice list', also='''lattice'': only for rectangles', &
+      meaning='form of the non-local operators: ''lattice'' is several times faster and needs ' &
+      //'a body on a lattice, ''list'' takes any points, ''auto'' chooses'))
   end subroutine declare_run
 
   pure subroutine declare_discretisation(list, n)
@@ -252,7 +256,7 @@ contains
       also='needed for the rule fixed, else not allowed', meaning='the time step'))
     call declare(list, n, key_t(group, 'safety', unit='1', default='0.9', &
       range=range_t(0.0_wp, 10.0_wp, .true., .false.), &
-      also='at most 1 for the rule spectral; not with fixed', &
+      also='below 1 for the rule spectral; not with fixed', &
       meaning='factor on the time step of the rule'))
     call declare(list, n, key_t(group, 'damping', unit='kg/(m^3 s)', default='0.0', &
       range=not_negative, meaning='force per volume and velocity against the motion, C'))

@@ -4,7 +4,7 @@ module pd_kinds
   implicit none
   private
 
-  public :: wp, i8, pi, unset, is_set, n_block
+  public :: wp, i8, pi, unset, is_set, n_block, block_sum
 
   integer, parameter :: wp = real64
   integer, parameter :: i8 = int64
@@ -16,7 +16,7 @@ module pd_kinds
 
   !> Points are worked on in blocks of this many, whatever the number of threads: every sum is
   !> taken over a block and then over the blocks in order, so the bits do not depend on threads.
-  integer, parameter :: n_block = 512
+  integer, parameter :: n_block = 256
 
 contains
 
@@ -26,5 +26,20 @@ contains
 
     is_set = x > 0.5_wp * unset
   end function is_set
+
+  !> Sum of a block by eight partial sums: one order of additions whatever the compiler does.
+  pure real(wp) function block_sum(x)
+    real(wp), intent(in) :: x(n_block)
+    integer, parameter :: lanes = 8
+    real(wp) :: partial(lanes)
+    integer  :: i
+
+    partial = 0.0_wp
+    do i = 1, n_block, lanes
+      partial = partial + x(i:i + lanes - 1)
+    end do
+    block_sum = ((partial(1) + partial(5)) + (partial(2) + partial(6))) &
+      + ((partial(3) + partial(7)) + (partial(4) + partial(8)))
+  end function block_sum
 
 end module pd_kinds

@@ -12,15 +12,15 @@ module pd_kinematics
 
 contains
 
-  !> K^-1 of every point. K = sum omega V_j xi (x) xi is the gradient operator applied to X, which
-  !> makes an affine map exact whatever the round-off of the sums.
+  !> K^-1 of every point; zero for voids (volume 0).
   !>
   !> Errors: a family with too few bonds or (nearly) on one line: condition number of K, a
   !> scale-free number, over 1e6. The first few such points are named with their positions.
-  subroutine inverse_shape_tensor(operators, position, k_inverse, errors)
-    type(operators_t),  intent(in)    :: operators
-    real(wp),           intent(in)    :: position(:, :)   !! X (n,2) [m]
-    real(wp),           intent(out)   :: k_inverse(:, :)  !! (n,3) xx yy xy [1/m^4]
+  subroutine inverse_shape_tensor(operators, position, volume, k_inverse, errors)
+    class(operators_t), intent(in)    :: operators
+    real(wp),           intent(in), contiguous :: position(:, :)   !! X (n,2) [m]
+    real(wp),           intent(in), contiguous :: volume(:)        !! V (n) [m^2]; voids: 0
+    real(wp),           intent(out), contiguous :: k_inverse(:, :)  !! (n,3) xx yy xy [1/m^4]
     type(error_list_t), intent(inout) :: errors
     real(wp), parameter :: largest_condition = 1.0e6_wp
     integer,  parameter :: most_reported = 10
@@ -29,19 +29,20 @@ contains
     character(160) :: text
     integer  :: i, n_singular
 
-    allocate (k(operators%n, 4))
-    call operators%gradient(position, k)
+    allocate (k(operators%n, 3))
+    call operators%shape_tensor(k)
     n_singular = 0
     do i = 1, operators%n
-      mean = 0.5_wp * (k(i, 1) + k(i, 4))
-      radius = sqrt((0.5_wp * (k(i, 1) - k(i, 4)))**2 + k(i, 2)**2)
-      determinant = k(i, 1) * k(i, 4) - k(i, 2)**2
+      k_inverse(i, :) = 0.0_wp
+      if (volume(i) <= 0.0_wp) cycle
+      mean = 0.5_wp * (k(i, 1) + k(i, 2))
+      radius = sqrt((0.5_wp * (k(i, 1) - k(i, 2)))**2 + k(i, 3)**2)
+      determinant = k(i, 1) * k(i, 2) - k(i, 3)**2
       if (determinant > 0.0_wp .and. mean + radius < largest_condition * (mean - radius)) then
-        k_inverse(i, 1) = k(i, 4) / determinant
+        k_inverse(i, 1) = k(i, 2) / determinant
         k_inverse(i, 2) = k(i, 1) / determinant
-        k_inverse(i, 3) = -k(i, 2) / determinant
+        k_inverse(i, 3) = -k(i, 3) / determinant
       else
-        k_inverse(i, :) = 0.0_wp
         n_singular = n_singular + 1
         if (n_singular > most_reported) cycle
         write (text, '(a,i0,a,g0.7,a,g0.7,a)') 'point ', i, ' at (', position(i, 1), ', ', &
@@ -60,27 +61,37 @@ contains
   !>
   !> `gradient` may be the array that receives F.
   subroutine deformation_gradient(k_inverse, gradient)
-    real(wp), intent(in)    :: k_inverse(:, :)  !! (n,3) xx yy xy [1/m^4]
-    real(wp), intent(inout) :: gradient(:, :)   !! (n,4) xx xy yx yy; in: G[u] [m^4], out: F
-    integer  :: i, lo, n
-    real(wp) :: gx, gy
+    real(wp), intent(in), contiguous :: k_inverse(:, :)  !! (n,3) xx yy xy [1/m^4]
+    real(wp), intent(inout), contiguous :: gradient(:, :)   !! (n,4) xx xy yx yy; G[u] [m^4] -> F
+    integer :: lo, n
 
     n = size(gradient, 1)
-    !$omp parallel do schedule(static) default(none) shared(n, k_inverse, gradient) &
-    !$omp private(i, lo, gx, gy)
+    !$omp parallel do schedule(static) default(none) shared(n, k_inverse, gradient) private(lo)
     do lo = 1, n, n_block
-      do i = lo, min(lo + n_block - 1, n)
-        gx = gradient(i, 1)
-        gy = gradient(i, 2)
-        gradient(i, 1) = 1.0_wp + gx * k_inverse(i, 1) + gy * k_inverse(i, 3)
-        gradient(i, 2) = gx * k_inverse(i, 3) + gy * k_inverse(i, 2)
-        gx = gradient(i, 3)
-        gy = gradient(i, 4)
-        gradient(i, 3) = gx * k_inverse(i, 1) + gy * k_inverse(i, 3)
-        gradient(i, 4) = 1.0_wp + gx * k_inverse(i, 3) + gy * k_inverse(i, 2)
-      end do
+      call deformation_gradient_block(lo, min(lo + n_block - 1, n), k_inverse, gradient)
     end do
     !$omp end parallel do
   end subroutine deformation_gradient
+
+  !> The same for points lo to hi.
+  pure subroutine deformation_gradient_block(lo, hi, k_inverse, gradient)
+    integer,  intent(in) :: lo, hi
+    real(wp), intent(in),    contiguous :: k_inverse(:, :)
+    real(wp), intent(inout), contiguous :: gradient(:, :)
+    integer  :: i
+    real(wp) :: gxx, gxy, gyx, gyy
+
+    !$omp simd private(gxx, gxy, gyx, gyy)
+    do i = lo, hi
+      gxx = gradient(i, 1)
+      gxy = gradient(i, 2)
+      gyx = gradient(i, 3)
+      gyy = gradient(i, 4)
+      gradient(i, 1) = 1.0_wp + gxx * k_inverse(i, 1) + gxy * k_inverse(i, 3)
+      gradient(i, 2) = gxx * k_inverse(i, 3) + gxy * k_inverse(i, 2)
+      gradient(i, 3) = gyx * k_inverse(i, 1) + gyy * k_inverse(i, 3)
+      gradient(i, 4) = 1.0_wp + gyx * k_inverse(i, 3) + gyy * k_inverse(i, 2)
+    end do
+  end subroutine deformation_gradient_block
 
 end module pd_kinematics

@@ -231,10 +231,10 @@ contains
         end if
       else if (t%time_step_rule /= '') then
         call add_useless(group, 'time_step', 'without time_step_rule = ''fixed''', errors)
-        if (t%time_step_rule == 'spectral' .and. t%safety > 1.0_wp) &
+        if (t%time_step_rule == 'spectral' .and. t%safety >= 1.0_wp) &
           call errors%add('the time step would not be stable', where=place_of(group, 'safety'), &
                           found=number_text(t%safety), &
-                          allowed='> 0 and <= 1 for time_step_rule = ''spectral''')
+                          allowed='> 0 and < 1 for time_step_rule = ''spectral''')
       end if
     end associate
   end subroutine check_integration
@@ -292,7 +292,8 @@ contains
                         found='rate of approach '//number_text(final_rate(approach)), &
                         allowed='> 0 [m/s]')
       else if (is_set(extent)) then
-        if (largest_approach(approach, maxval(approach%times)) < strain*extent) &
+        if (largest_approach(approach, maxval(approach%times)) &
+            < strain*extent*(1.0_wp - 1.0e-9_wp)) &
           call errors%add('the platens never come that near', where=place_of(group, key), &
                           found=number_text(strain), allowed='at most ' &
                           //number_text(largest_approach(approach, maxval(approach%times))/extent))

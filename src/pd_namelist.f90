@@ -355,6 +355,8 @@ contains
         call damage('has one = too many')
         scanner%at = scanner%at + 1
         cycle
+      case default   ! a value, or the next key
+        continue
       end select
       if (index(quotes, scanner%next()) == 0) then
         word = scanner%token()

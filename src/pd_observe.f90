@@ -4,15 +4,15 @@
 module pd_observe
   use pd_force, only: solid_t
   use pd_geometry, only: body_t
-  use pd_j2, only: elastic_energy, von_mises
-  use pd_kinds, only: n_block, wp
+  use pd_j2, only: elastic_energy_block, von_mises
+  use pd_kinds, only: block_sum, n_block, wp
   use pd_operators, only: operators_t
   use pd_state, only: state_t
-  use pd_strain, only: cauchy, determinant, first_piola, green_lagrange
+  use pd_strain, only: cauchy, determinant, first_piola_block, green_lagrange, green_lagrange_block
   implicit none
   private
 
-  public :: ledger_t, observation_t, observe, kinetic_energy, running_away, point_fields
+  public :: ledger_t, observation_t, observe, running_away, point_fields
 
   !> Energies that are added up step by step [J/m], and what the balance refers to.
   type :: ledger_t
@@ -42,7 +42,7 @@ contains
   subroutine observe(body, solid, operators, state, ledger, seen)
     type(body_t),        intent(in)  :: body
     type(solid_t),       intent(in)  :: solid
-    type(operators_t),   intent(in)  :: operators
+    class(operators_t),  intent(in)  :: operators
     type(state_t),       intent(in)  :: state
     type(ledger_t),      intent(in)  :: ledger
     type(observation_t), intent(out) :: seen
@@ -84,50 +84,44 @@ contains
     type(solid_t), intent(in)  :: solid
     type(state_t), intent(in)  :: state
     real(wp),      intent(out) :: sums(n_sums), largest
-    real(wp) :: f(4), s(4), p(4), e(4)
-    integer  :: i
+    real(wp) :: weight(n_block), p(n_block, 4), e(n_block, 4), energy(n_block)
+    real(wp) :: terms(n_block, n_sums)
+    integer  :: n
 
-    sums = 0.0_wp
-    largest = 0.0_wp
-    do i = lo, hi
-      f = state%deformation_gradient(i, :)
-      s = state%stress(i, :)
-      sums(5) = sums(5) + body%volume(i) * elastic_energy(solid%material, s)
-      sums(6) = sums(6) + 0.5_wp * solid%density * body%volume(i) * sum(state%velocity(i, :)**2)
-      if (body%boundary(i) /= 0) cycle
-      p = first_piola(f, s)
-      e = green_lagrange(f)
-      sums(1:4) = sums(1:4) + body%volume(i) * [1.0_wp, p(1), p(4), e(2)]
-      largest = max(largest, state%alpha(i))
+    n = hi - lo + 1
+    terms = 0.0_wp
+    call first_piola_block(lo, hi, state%deformation_gradient, state%stress, p)
+    call green_lagrange_block(lo, hi, state%deformation_gradient, e)
+    call elastic_energy_block(solid%material, lo, hi, state%stress, energy)
+    associate (volume => body%volume(lo:hi), boundary => body%boundary(lo:hi), &
+      v => state%velocity(lo:hi, :))
+      weight(:n) = merge(volume, 0.0_wp, boundary == 0)
+      terms(:n, 1) = weight(:n)
+      terms(:n, 2) = weight(:n) * p(:n, 1)
+      terms(:n, 3) = weight(:n) * p(:n, 4)
+      terms(:n, 4) = weight(:n) * e(:n, 2)
+      terms(:n, 5) = volume * energy(:n)
+      terms(:n, 6) = 0.5_wp * solid%density * volume * (v(:, 1)**2 + v(:, 2)**2)
+    end associate
+    do n = 1, n_sums
+      sums(n) = block_sum(terms(:, n))
     end do
+    largest = maxval(merge(state%alpha(lo:hi), 0.0_wp, body%boundary(lo:hi) == 0))
   end subroutine sum_block
-
-  !> Kinetic energy of all points [J/m].
-  pure real(wp) function kinetic_energy(body, density, velocity) result(energy)
-    type(body_t), intent(in) :: body
-    real(wp),     intent(in) :: density          !! [kg/m^3]
-    real(wp),     intent(in) :: velocity(:, :)   !! (n,2) [m/s]
-    integer :: i
-
-    energy = 0.0_wp
-    do i = 1, body%n
-      energy = energy + 0.5_wp * density * body%volume(i) * sum(velocity(i, :)**2)
-    end do
-  end function kinetic_energy
 
   !> Energy of the control: with constant c it has a potential, (1/2) sum V c sum omega V_j |z|^2,
   !> which is the work of the control forces without the error of adding it up.
   real(wp) function control_energy(body, solid, operators, state) result(energy)
     type(body_t),      intent(in) :: body
     type(solid_t),     intent(in) :: solid
-    type(operators_t), intent(in) :: operators
+    class(operators_t), intent(in) :: operators
     type(state_t),     intent(in) :: state
     real(wp), allocatable :: z2(:)
 
     energy = 0.0_wp
     if (.not. allocated(solid%control)) return
     allocate (z2(body%n))
-    call operators%zero_energy_squared(body%position, state%displacement, &
+    call operators%zero_energy_squared(state%displacement, &
       state%deformation_gradient, z2)
     energy = 0.5_wp * sum(body%volume * solid%control * z2)
   end function control_energy
@@ -157,7 +151,7 @@ contains
   !> has failed (det F <= 0) has no Cauchy stress: 0.
   subroutine point_fields(body, operators, state, delta, stress, strain, mises, zero_energy)
     type(body_t),      intent(in)  :: body
-    type(operators_t), intent(in)  :: operators
+    class(operators_t), intent(in)  :: operators
     type(state_t),     intent(in)  :: state
     real(wp),          intent(in)  :: delta            !! horizon [m]
     real(wp),          intent(out) :: stress(:, :)     !! (n,4) xx yy zz xy [Pa]
@@ -167,7 +161,7 @@ contains
     integer  :: i
     real(wp) :: f(4)
 
-    call operators%zero_energy_squared(body%position, state%displacement, &
+    call operators%zero_energy_squared(state%displacement, &
       state%deformation_gradient, zero_energy)
     !$omp parallel do schedule(static) default(none) private(i, f) &
     !$omp shared(body, operators, state, delta, stress, strain, mises, zero_energy)

@@ -103,7 +103,7 @@ contains
     if (time <= times(1)) value = values(1)
     do k = 2, n
       if (time >= times(k)) cycle
-      if (time > times(k - 1)) value = values(k - 1) &
+      if (time >= times(k - 1)) value = values(k - 1) &
         + (values(k) - values(k - 1))*((time - times(k - 1))/(times(k) - times(k - 1)))
       return
     end do
@@ -133,7 +133,8 @@ contains
     if (upper <= lower) return
     extent = upper - lower
     if (input%bodies(1)%shape == 'rectangle' .and. is_set(input%discretisation%spacing)) &
-      extent = anint(extent/input%discretisation%spacing)*input%discretisation%spacing
+      extent = floor(extent/input%discretisation%spacing + 0.5_wp + 1.0e-6_wp) &
+               *input%discretisation%spacing
     if (extent <= 0.0_wp) extent = unset
   end function platen_extent
 

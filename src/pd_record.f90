@@ -26,7 +26,7 @@ module pd_record
   private
 
   public :: record_t, results_in_the_way, open_record, close_record, record_row, record_frame
-  public :: record_failure, record_progress, record_line
+  public :: record_failure, record_progress, record_line, observe_state
   public :: save_checkpoint, load_checkpoint, same_points
 
   !> The open outputs of a run.
@@ -122,9 +122,11 @@ contains
     description%upper = model%body%upper
     description%time_step = schedule%time_step
     description%steps = schedule%steps
-    description%position = model%body%position
-    description%volume = model%body%volume
-    description%boundary = model%body%boundary
+    associate (body => model%body, places => model%body%points)
+      description%position = body%position(places, :)
+      description%volume = body%volume(places)
+      description%boundary = body%boundary(places)
+    end associate
     allocate (character(64) :: description%boundary_names(size(model%boundaries)))
     do k = 1, size(model%boundaries)
       description%boundary_names(k) = model%boundaries(k)%name
@@ -141,18 +143,25 @@ contains
     call close_progress(record%progress, errors)
   end subroutine close_record
 
-  !> Observe the state and write a row of the history.
-  subroutine record_row(model, state, ledger, step, record, errors)
+  !> Observe the state; what is seen stays in the record.
+  subroutine observe_state(model, state, ledger, record)
+    type(model_t),  intent(in)    :: model
+    type(state_t),  intent(in)    :: state
+    type(ledger_t), intent(in)    :: ledger
+    type(record_t), intent(inout) :: record
+
+    call observe(model%body, model%solid, model%operators, state, ledger, record%seen)
+  end subroutine observe_state
+
+  !> Write a row of the history with what was seen of the state.
+  subroutine record_row(model, step, record, errors)
     type(model_t),      intent(in)    :: model
-    type(state_t),      intent(in)    :: state
-    type(ledger_t),     intent(in)    :: ledger
     integer,            intent(in)    :: step
     type(record_t),     intent(inout) :: record
     type(error_list_t), intent(inout) :: errors
     type(history_row_t) :: row
     integer :: k
 
-    call observe(model%body, model%solid, model%operators, state, ledger, record%seen)
     row%step = step
     row%time = real(step, wp) * model%motion%time_step
     row%strain = strain_at(model, row%time)
@@ -222,14 +231,22 @@ contains
     type(model_t), intent(in) :: model
     type(state_t), intent(in) :: state
     type(frame_fields_t), intent(out) :: fields
+    real(wp), allocatable :: stress(:, :), strain(:, :), mises(:), zero_energy(:)
+    integer :: n
 
-    allocate (fields%stress(model%body%n, 4), fields%strain(model%body%n, 4))
-    allocate (fields%von_mises(model%body%n), fields%zero_energy(model%body%n))
-    fields%displacement = state%displacement
-    fields%velocity = state%velocity
-    fields%plastic_strain = state%alpha
-    call point_fields(model%body, model%operators, state, model%delta, fields%stress, &
-      fields%strain, fields%von_mises, fields%zero_energy)
+    n = model%body%n
+    allocate (stress(n, 4), strain(n, 4), mises(n), zero_energy(n))
+    call point_fields(model%body, model%operators, state, model%delta, stress, strain, mises, &
+      zero_energy)
+    associate (places => model%body%points)
+      fields%displacement = state%displacement(places, :)
+      fields%velocity = state%velocity(places, :)
+      fields%plastic_strain = state%alpha(places)
+      fields%stress = stress(places, :)
+      fields%strain = strain(places, :)
+      fields%von_mises = mises(places)
+      fields%zero_energy = zero_energy(places)
+    end associate
   end subroutine gather_fields
 
   !> Show where the run stands; axial stress and largest alpha are those of the last row.
@@ -282,12 +299,16 @@ contains
     checkpoint%ledger = [ledger%initial_kinetic_energy, ledger%plastic_dissipation, &
       ledger%damping_dissipation, ledger%external_work, ledger%largest_work]
     checkpoint%input = record%values
-    checkpoint%position = model%body%position
-    checkpoint%volume = model%body%volume
-    call write_checkpoint(record%stem, checkpoint, state, errors)
+    associate (body => model%body, places => model%body%points)
+      checkpoint%position = body%position(places, :)
+      checkpoint%volume = body%volume(places)
+      checkpoint%boundary = body%boundary(places)
+      call write_checkpoint(record%stem, checkpoint, state%gathered(places), errors)
+    end associate
   end subroutine save_checkpoint
 
-  !> Read the newest checkpoint and compare its input with the present one.
+  !> Read the newest checkpoint and compare its input with the present one. The state has the points
+  !> of the body, without voids.
   !>
   !> Errors, `file_errors`: no checkpoint that can be read; `input_errors`: values that differ.
   subroutine load_checkpoint(input, checkpoint, state, ledger, warning, file_errors, input_errors)
@@ -313,14 +334,16 @@ contains
     call compare_used(checkpoint%input, used_values(input), input_errors)
   end subroutine load_checkpoint
 
-  !> Whether the points of a checkpoint are those of the body (a point cloud may have changed).
+  !> Whether the points of a checkpoint are those of the body, boundaries included (a point cloud
+  !> may have changed).
   pure logical function same_points(checkpoint, body) result(same)
     type(checkpoint_t), intent(in) :: checkpoint
     type(body_t),       intent(in) :: body
 
-    same = size(checkpoint%volume) == body%n
-    if (same) same = all(abs(checkpoint%position - body%position) <= 0.0_wp) &
-      .and. all(abs(checkpoint%volume - body%volume) <= 0.0_wp)
+    same = size(checkpoint%volume) == size(body%points)
+    if (same) same = all(abs(checkpoint%position - body%position(body%points, :)) <= 0.0_wp) &
+      .and. all(abs(checkpoint%volume - body%volume(body%points)) <= 0.0_wp) &
+      .and. all(checkpoint%boundary == body%boundary(body%points))
   end function same_points
 
 end module pd_record

@@ -53,7 +53,7 @@ contains
     end if
     schedule%steps = max(1, step_at(end_time, time_step))
     do k = 1, size(frame_times)
-      schedule%frame_steps(k) = min(schedule%steps, step_at(frame_times(k), time_step))
+      schedule%frame_steps(k) = max(1, min(schedule%steps, step_at(frame_times(k), time_step)))
     end do
   end subroutine new_schedule
 

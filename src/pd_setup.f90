@@ -2,19 +2,21 @@
 !>
 !> The only module that knows both the input and the physics.
 module pd_setup
+  use pd_bond_list, only: bond_list_t, new_bond_list
   use pd_boundary, only: boundary_t, mark_free, move, new_affine_boundary, new_rigid_boundary, &
     platens_t, reference_ends, table_t, time_of_strain
   use pd_cloud, only: read_cloud
   use pd_errors, only: error_list_t
   use pd_families, only: horizon_t, new_horizon
   use pd_force, only: control_stiffness, solid_t
-  use pd_geometry, only: body_t, lattice_body, lattice_t, layer_t
+  use pd_geometry, only: body_t, lattice_body, lattice_t, layer_t, nearest_count
   use pd_input, only: resolved_path
   use pd_input_types, only: boundary_input_t, input_t
   use pd_j2, only: new_j2
   use pd_kinds, only: is_set, wp
   use pd_kinematics, only: inverse_shape_tensor
-  use pd_operators, only: new_operators, operators_t
+  use pd_lattice, only: lattice_operators_t, new_lattice_operators
+  use pd_operators, only: operators_t
   use pd_schedule, only: new_schedule, schedule_t
   use pd_stability, only: highest_frequency, wave_speed
   use pd_state, only: state_t
@@ -23,12 +25,13 @@ module pd_setup
   private
 
   public :: model_t, set_up_body, set_up_model, set_up_schedule, start, damping_frame
+  public :: find_highest_frequency
 
   !> Everything about a run that does not change while it runs, and the boundaries with the forces
   !> of the present step.
   type :: model_t
     type(body_t)      :: body
-    type(operators_t) :: operators
+    class(operators_t), allocatable :: operators
     type(solid_t)     :: solid
     type(motion_t)    :: motion
     type(platens_t)   :: platens
@@ -45,23 +48,25 @@ contains
   !> Points, volumes and boundary sets.
   !>
   !> Errors: a cloud file that is wrong; a body without points, a boundary without points.
-  subroutine set_up_body(input, body, warnings, errors)
+  subroutine set_up_body(input, body, warnings, input_errors, errors)
     type(input_t),      intent(in)    :: input
     type(body_t),       intent(out)   :: body
-    type(error_list_t), intent(inout) :: warnings, errors
+    type(error_list_t), intent(inout) :: warnings
+    type(error_list_t), intent(inout) :: input_errors   !! of a cloud file
+    type(error_list_t), intent(inout) :: errors         !! of the model
 
     if (input%bodies(1)%shape == 'file') then
-      call cloud_body(input, body, errors)
+      call cloud_body(input, body, input_errors, errors)
     else
       call rectangle_body(input, body, warnings, errors)
     end if
   end subroutine set_up_body
 
   !> Body from a point cloud. Where the input gives its real extent, that counts.
-  subroutine cloud_body(input, body, errors)
+  subroutine cloud_body(input, body, input_errors, errors)
     type(input_t),      intent(in)    :: input
     type(body_t),       intent(out)   :: body
-    type(error_list_t), intent(inout) :: errors
+    type(error_list_t), intent(inout) :: input_errors, errors
     character(64) :: names(size(input%boundaries))
     integer :: k
 
@@ -69,13 +74,13 @@ contains
       names(k) = input%boundaries(k)%name
     end do
     associate (cloud => input%bodies(1))
-      call read_cloud(resolved_path(input, cloud%file), names, body, errors)
+      call read_cloud(resolved_path(input, cloud%file), names, body, input_errors)
       if (is_set(cloud%x_min)) then
         body%lower = [cloud%x_min, cloud%y_min]
         body%upper = [cloud%x_max, cloud%y_max]
       end if
     end associate
-    if (errors%count() > 0) return
+    if (input_errors%count() > 0) return
     do k = 1, size(names)
       if (.not. any(body%boundary == k)) &
         call errors%add('a boundary holds no point', '&boundary name = '//trim(names(k)))
@@ -87,7 +92,8 @@ contains
     type(input_t),      intent(in)    :: input
     type(body_t),       intent(out)   :: body
     type(error_list_t), intent(inout) :: warnings, errors
-    real(wp) :: lower(2, size(input%bodies)), upper(2, size(input%bodies)), asked(4), found(4)
+    real(wp) :: lower(2, size(input%bodies)), upper(2, size(input%bodies))
+    real(wp) :: asked(4 * size(input%bodies)), found(4 * size(input%bodies))
     type(layer_t)   :: layers(size(input%boundaries))
     type(lattice_t) :: lattice
     character(120)  :: text
@@ -102,17 +108,21 @@ contains
       lattice%cells = d%layout == 'cells'
       lattice%tributary = d%volumes == 'tributary'
       lattice%rows = ceiling(d%horizon / d%spacing - 1.0e-6_wp)
+      lattice%with_voids = input%run%operators /= 'list'
     end associate
     do k = 1, size(layers)
       layers(k)%side = input%boundaries(k)%side
       layers(k)%boundary = k
     end do
     call lattice_body(lower, upper, lattice, layers, body, errors)
-    asked = [minval(lower, dim=2), maxval(upper, dim=2)]
-    found = [body%lower, body%upper]
+    asked = [(lower(:, k), upper(:, k), k=1, size(lower, 2))]
+    do k = 1, size(asked), 2
+      found(k:k + 1) = lower(:, 1) + lattice%spacing &
+        * real(nearest_count(asked(k:k + 1) - lower(:, 1), lattice%spacing), wp)
+    end do
     if (any(abs(found - asked) > 1.0e-6_wp * lattice%spacing) .and. errors%count() == 0) then
-      write (text, '(a,4(g0.8,a))') 'the body is adjusted to the spacing: x from ', found(1), &
-        ' to ', found(3), ' m, y from ', found(2), ' to ', found(4), ' m'
+      write (text, '(a,4(g0.8,a))') 'the body is adjusted to the spacing: x from ', body%lower(1), &
+        ' to ', body%upper(1), ' m, y from ', body%lower(2), ' to ', body%upper(2), ' m'
       call warnings%add(trim(text), '&body')
     end if
   end subroutine rectangle_body
@@ -129,15 +139,37 @@ contains
     model%spacing = input%discretisation%spacing
     model%delta = input%discretisation%horizon
     horizon = new_horizon(model%delta, input%discretisation%influence)
-    call new_operators(horizon, model%body%position, model%body%volume, model%operators, errors)
+    call choose_operators(horizon, model, errors)
     if (errors%count() > 0) return
     allocate (model%solid%k_inverse(model%body%n, 3))
-    call inverse_shape_tensor(model%operators, model%body%position, model%solid%k_inverse, errors)
+    call inverse_shape_tensor(model%operators, model%body%position, model%body%volume, &
+      model%solid%k_inverse, errors)
     if (errors%count() > 0) return
     call set_up_solid(input, model)
     call set_up_boundaries(input, model)
     if (.not. any(model%free > 0.0_wp)) call errors%add('no point is free to move')
   end subroutine set_up_model
+
+  !> Lattice operators for a body on a lattice (its places are then numbered with voids), the bond
+  !> list for any other.
+  subroutine choose_operators(horizon, model, errors)
+    type(horizon_t),    intent(in)    :: horizon
+    type(model_t),      intent(inout) :: model
+    type(error_list_t), intent(inout) :: errors
+    type(lattice_operators_t), allocatable :: lattice
+    type(bond_list_t),         allocatable :: list
+
+    if (model%body%stride > 0) then
+      allocate (lattice)
+      call new_lattice_operators(horizon, model%spacing, model%body%stride, model%body%volume, &
+        lattice)
+      call move_alloc(lattice, model%operators)
+    else
+      allocate (list)
+      call new_bond_list(horizon, model%body%position, model%body%volume, list, errors)
+      call move_alloc(list, model%operators)
+    end if
+  end subroutine choose_operators
 
   !> Material, its flaw, zero-energy control.
   subroutine set_up_solid(input, model)
@@ -162,6 +194,7 @@ contains
       if (input%stabilisation%method == 'silling') then
         allocate (solid%control(model%body%n), source=control_stiffness( &
           input%stabilisation%factor, m%youngs_modulus, model%delta, model%operators%weight_sum))
+        where (model%body%boundary < 0) solid%control = 0.0_wp
       end if
     end associate
   end subroutine set_up_solid
@@ -179,6 +212,9 @@ contains
     allocate (model%free(model%body%n, 2))
     call mark_free(model%body%position, model%body%volume, input%material%density, &
       model%boundaries, model%free)
+    do k = 1, 2
+      where (model%body%boundary < 0) model%free(:, k) = 0.0_wp
+    end do
 
     model%motion%density = input%material%density
     model%motion%damping = input%integration%damping
@@ -249,7 +285,7 @@ contains
     type(error_list_t), intent(inout) :: errors
     real(wp), allocatable :: frame_times(:)
     real(wp) :: end_time
-    integer  :: k, iterations
+    integer  :: k
 
     associate (given => input%integration, dt => model%motion%time_step)
       dt = time_step
@@ -260,8 +296,7 @@ contains
         case ('courant')
           dt = given%safety * model%spacing / wave_speed(model%solid)
         case default
-          call highest_frequency(model%operators, model%solid, model%body%volume, model%free, &
-            model%highest_frequency, iterations)
+          call find_highest_frequency(model)
           dt = given%safety * 2.0_wp / model%highest_frequency
         end select
       end if
@@ -307,6 +342,15 @@ contains
 
   end subroutine set_up_schedule
 
+  !> Highest frequency of the model, unless it is known already.
+  subroutine find_highest_frequency(model)
+    type(model_t), intent(inout) :: model
+    integer :: iterations
+
+    if (model%highest_frequency <= 0.0_wp) call highest_frequency(model%operators, model%solid, &
+      model%body%volume, model%free, model%highest_frequency, iterations)
+  end subroutine find_highest_frequency
+
   !> Velocity at both ends of the frame in which the damping acts, at time t.
   pure type(frame_t) function damping_frame(model, t) result(frame)
     type(model_t), intent(in) :: model
@@ -328,6 +372,9 @@ contains
     do k = 1, 2
       state%velocity(:, k) = reference_velocity(model%motion, frame, k, &
         model%body%position(:, model%motion%axis))
+    end do
+    do k = 1, 2
+      where (model%body%boundary < 0) state%velocity(:, k) = 0.0_wp
     end do
     call move(model%boundaries, model%body%position, 0.0_wp, state%displacement, state%velocity)
   end subroutine start

@@ -18,6 +18,8 @@ module pd_state
     real(wp), allocatable :: alpha(:)                    !! equivalent plastic strain (n)
   contains
     procedure :: allocate => allocate_state
+    procedure :: gathered
+    procedure :: scattered
   end type state_t
 
 contains
@@ -33,5 +35,39 @@ contains
     allocate (self%stress(n, 4), self%plastic_strain(n, 4), self%back_stress(n, 4), source=0.0_wp)
     allocate (self%alpha(n), source=0.0_wp)
   end subroutine allocate_state
+
+  !> The state of some places only, in their order.
+  function gathered(self, places) result(state)
+    class(state_t), intent(in) :: self
+    integer,        intent(in) :: places(:)
+    type(state_t) :: state
+
+    allocate (state%displacement(size(places), 2), source=self%displacement(places, :))
+    allocate (state%velocity(size(places), 2), source=self%velocity(places, :))
+    allocate (state%force(size(places), 2), source=self%force(places, :))
+    allocate (state%deformation_gradient(size(places), 4), &
+      source=self%deformation_gradient(places, :))
+    allocate (state%stress(size(places), 4), source=self%stress(places, :))
+    allocate (state%plastic_strain(size(places), 4), source=self%plastic_strain(places, :))
+    allocate (state%back_stress(size(places), 4), source=self%back_stress(places, :))
+    allocate (state%alpha(size(places)), source=self%alpha(places))
+  end function gathered
+
+  !> The state of n places from that of some of them; the others are unloaded and at rest.
+  function scattered(self, places, n) result(state)
+    class(state_t), intent(in) :: self
+    integer,        intent(in) :: places(:), n
+    type(state_t) :: state
+
+    call state%allocate(n)
+    state%displacement(places, :) = self%displacement
+    state%velocity(places, :) = self%velocity
+    state%force(places, :) = self%force
+    state%deformation_gradient(places, :) = self%deformation_gradient
+    state%stress(places, :) = self%stress
+    state%plastic_strain(places, :) = self%plastic_strain
+    state%back_stress(places, :) = self%back_stress
+    state%alpha(places) = self%alpha
+  end function scattered
 
 end module pd_state

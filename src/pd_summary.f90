@@ -12,9 +12,11 @@ module pd_summary
 
   public :: summary_t, summarise, estimated_seconds
 
+  integer, parameter :: line_length = 540   !! the longest title fits
+
   !> Lines of text.
   type :: summary_t
-    character(112), allocatable :: lines(:)
+    character(line_length), allocatable :: lines(:)
   contains
     procedure :: add
   end type summary_t
@@ -25,7 +27,7 @@ contains
   pure subroutine add(self, label, text)
     class(summary_t), intent(inout) :: self
     character(*),     intent(in)    :: label, text
-    character(112), allocatable :: longer(:)
+    character(line_length), allocatable :: longer(:)
     character(20) :: column
     integer :: n
 
@@ -52,21 +54,23 @@ contains
       call summary%add('title', input%run%title)
       call summary%add('body', number(body%upper(1) - body%lower(1))//' m x '// &
         number(body%upper(2) - body%lower(2))//' m')
-      call summary%add('points', whole(body%n)//', of which fictitious '// &
+      call summary%add('points', whole(size(body%points))//', of which fictitious '// &
         whole(count(body%boundary > 0)))
       call model%operators%fewest_bonds(fewest, point)
-      call summary%add('bonds', number(bonds)//'; per point '//number(bonds / real(body%n, wp))// &
+      call summary%add('bonds', number(bonds)//'; per point '// &
+        number(bonds / real(size(body%points), wp))// &
         ' on average, '//whole(fewest)//' at least')
-      call summary%add('horizon', number(model%delta)//' m = '// &
-        number(model%delta / model%spacing)//' spacings of '//number(model%spacing)//' m')
+      call summary%add('horizon', number(model%delta)//' m, spacing '// &
+        number(model%spacing)//' m: m = '//number(model%delta / model%spacing))
       call summary%add('wave speed', 'c_p = '//number(wave_speed(model%solid))//' m/s')
       courant = model%spacing / wave_speed(model%solid)
       text = number(schedule%time_step)//' s = '//number(schedule%time_step / courant)// &
         ' dx/c_p, rule '//input%integration%time_step_rule
-      if (model%highest_frequency > 0.0_wp) text = text//': '// &
-        number(input%integration%safety)//' x limit 2/omega_max = '// &
-        number(2.0_wp / model%highest_frequency)//' s'
+      if (input%integration%time_step_rule /= 'fixed') &
+        text = text//', safety '//number(input%integration%safety)
       call summary%add('time step', text)
+      if (model%highest_frequency > 0.0_wp) call summary%add('stable step', &
+        '2/omega_max = '//number(2.0_wp / model%highest_frequency)//' s, of the elastic body')
       call summary%add('steps', whole(schedule%steps)//' to '//number(schedule%end_time)//' s')
       if (model%platens%axis > 0) call summary%add('platens', &
         model%boundaries(model%platens%first)%name//' and '// &
@@ -86,27 +90,28 @@ contains
     memory = model%operators%memory() + real(model%body%n, wp) * 8.0_wp * (23 + 12 + 4 + 18)
   end function memory
 
-  !> Wall clock time of the run [s], from a few applications of the operators to this very model.
+  !> Wall clock time of the run [s], from the fastest of a few applications of the linear operator
+  !> to this very model.
   real(wp) function estimated_seconds(model, schedule) result(seconds)
     type(model_t),    intent(in) :: model
     type(schedule_t), intent(in) :: schedule
     !> A step with radial return, motion and energies against one with the linear operator.
     real(wp), parameter :: whole_step = 1.5_wp
     integer,  parameter :: repetitions = 5
-    real(wp), allocatable :: h(:, :), a(:, :), f(:, :)
+    real(wp), allocatable :: u(:, :), h(:, :), a(:, :), f(:, :)
     integer(int64) :: start, finish, rate
     integer :: k
 
     allocate (h(model%body%n, 4), a(model%body%n, 4), f(model%body%n, 2))
-    start = 0
-    rate = 1
-    do k = 0, repetitions
-      if (k == 1) call system_clock(start, rate)
-      call linear_force(model%operators, model%solid, model%body%position, h, a, f)
+    allocate (u(model%body%n, 2), source=0.0_wp)
+    seconds = huge(1.0_wp)
+    do k = 1, repetitions
+      call system_clock(start, rate)
+      call linear_force(model%operators, model%solid, u, h, a, f)
+      call system_clock(finish)
+      seconds = min(seconds, real(finish - start, wp) / real(rate, wp))
     end do
-    call system_clock(finish)
-    seconds = whole_step * real(finish - start, wp) / real(rate, wp) / real(repetitions, wp) &
-      * real(schedule%steps, wp)
+    seconds = whole_step * seconds * real(schedule%steps, wp)
   end function estimated_seconds
 
   !> Up to five significant digits.
@@ -125,7 +130,8 @@ contains
       decimals = max(0, 4 - floor(log10(abs(x))))
       write (form, '(a,i0,a)') '(f24.', decimals, ')'
       write (buffer, form) x
-      if (decimals > 0) buffer = buffer(:verify(buffer, '0', back=.true.))
+      if (decimals > 0) buffer = buffer(:verify(trim(buffer), '0', back=.true.))
+      if (buffer(len_trim(buffer):) == '.') buffer = buffer(:len_trim(buffer) - 1)
     end if
     text = trim(adjustl(buffer))
   end function number

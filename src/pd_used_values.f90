@@ -63,6 +63,7 @@ contains
     call lines%add_text('run.name', input%run%name)
     call lines%add_text('run.title', input%run%title)
     call lines%add_text('run.output_dir', input%run%output_dir)
+    call lines%add_text('run.operators', input%run%operators)
     associate (d => input%discretisation)
       call lines%add_real('discretisation.spacing', d%spacing)
       call lines%add_real('discretisation.horizon', d%horizon)
@@ -204,7 +205,7 @@ contains
 
   !> Name every value in which a run that is to go on differs from the run so far.
   !>
-  !> May differ: everything of output, run.title, run.output_dir, and a later end of the run.
+  !> May differ: everything of output, run.title, run.output_dir, run.operators, and a later end.
   subroutine compare_used(old, new, errors)
     character(*),       intent(in)    :: old(:), new(:)
     type(error_list_t), intent(inout) :: errors
@@ -243,7 +244,8 @@ contains
   pure logical function may_differ(key)
     character(*), intent(in) :: key
 
-    may_differ = index(key, 'output.') == 1 .or. key == 'run.title' .or. key == 'run.output_dir'
+    may_differ = index(key, 'output.') == 1 .or. key == 'run.title' .or. key == 'run.output_dir' &
+      .or. key == 'run.operators'
   end function may_differ
 
   pure logical function is_end(key)

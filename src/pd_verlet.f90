@@ -6,7 +6,7 @@
 !> Prescribed components are left to `pd_boundary`.
 !> Source: doc/theory.md, section 6.
 module pd_verlet
-  use pd_kinds, only: n_block, wp
+  use pd_kinds, only: block_sum, n_block, wp
   implicit none
   private
 
@@ -37,8 +37,16 @@ contains
     real(wp),       intent(in) :: x      !! coordinate of the point along motion%axis [m]
 
     v = frame%lower(k) + (frame%upper(k) - frame%lower(k)) &
-      * min(1.0_wp, max(0.0_wp, (x - motion%start) / motion%length))
+      * place_between(motion%start, motion%length, x)
   end function reference_velocity
+
+  !> Place of a point between the ends of the frame: 0 at and below the lower, 1 at and above the
+  !> upper one.
+  elemental real(wp) function place_between(start, length, x) result(place)
+    real(wp), intent(in) :: start, length, x   !! [m]
+
+    place = min(1.0_wp, max(0.0_wp, (x - start) / length))
+  end function place_between
 
   !> First half kick and drift.
   !>
@@ -47,81 +55,144 @@ contains
   subroutine kick_and_drift(motion, frame, position, volume, free, f, v, u, work)
     type(motion_t), intent(in)    :: motion
     type(frame_t),  intent(in)    :: frame            !! at step n
-    real(wp),       intent(in)    :: position(:, :)   !! X (n,2) [m]
-    real(wp),       intent(in)    :: volume(:)        !! V (n) [m^2]
-    real(wp),       intent(in)    :: free(:, :)       !! 1: free, 0: prescribed (n,2)
-    real(wp),       intent(in)    :: f(:, :)          !! f^n (n,2) [N/m^3]
-    real(wp),       intent(inout) :: v(:, :)          !! v^n -> v^{n+1/2} (n,2) [m/s]
-    real(wp),       intent(inout) :: u(:, :)          !! u^n -> u^{n+1} (n,2) [m]
+    real(wp),       intent(in), contiguous :: position(:, :)   !! X (n,2) [m]
+    real(wp),       intent(in), contiguous :: volume(:)        !! V (n) [m^2]
+    real(wp),       intent(in), contiguous :: free(:, :)       !! 1: free, 0: prescribed (n,2)
+    real(wp),       intent(in), contiguous :: f(:, :)          !! f^n (n,2) [N/m^3]
+    real(wp),       intent(inout), contiguous :: v(:, :)          !! v^n -> v^{n+1/2} (n,2) [m/s]
+    real(wp),       intent(inout), contiguous :: u(:, :)          !! u^n -> u^{n+1} (n,2) [m]
     real(wp),       intent(out)   :: work(2)          !! [J/m]
     real(wp), allocatable :: work_in(:, :)
-    real(wp) :: half, dt, c, ref, drag
-    integer  :: i, k, block, n, n_blocks
+    integer :: block, n_blocks
 
-    n = size(volume)
-    n_blocks = (n + n_block - 1) / n_block
+    n_blocks = (size(volume) + n_block - 1) / n_block
     allocate (work_in(2, n_blocks))
+    !$omp parallel do schedule(static) default(none) private(block) &
+    !$omp shared(n_blocks, motion, frame, position, volume, free, f, v, u, work_in)
+    do block = 1, n_blocks
+      call kick_and_drift_block((block - 1) * n_block + 1, min(block * n_block, size(volume)), &
+        motion, frame, position(:, motion%axis), volume, free, f, v, u, work_in(:, block))
+    end do
+    !$omp end parallel do
+    work = sum(work_in, dim=2)
+  end subroutine kick_and_drift
+
+  !> The same for points lo to hi.
+  pure subroutine kick_and_drift_block(lo, hi, motion, frame, x, volume, free, f, v, u, work)
+    integer,        intent(in)    :: lo, hi
+    type(motion_t), intent(in)    :: motion
+    type(frame_t),  intent(in)    :: frame
+    real(wp),       intent(in),    contiguous :: x(:)       !! coordinate along motion%axis (n) [m]
+    real(wp),       intent(in),    contiguous :: volume(:), free(:, :), f(:, :)
+    real(wp),       intent(inout), contiguous :: v(:, :), u(:, :)
+    real(wp),       intent(out)   :: work(2)
+    real(wp) :: drag_work(n_block), frame_work(n_block)
+    real(wp) :: half, dt, c, lower1, lower2, slope1, slope2, start, length
+    real(wp) :: place, ref1, ref2, drag1, drag2
+    integer  :: i, b
+
     dt = motion%time_step
     c = motion%damping
     half = 0.5_wp * dt / motion%density
-    !$omp parallel do schedule(static) default(none) private(i, k, block, ref, drag) &
-    !$omp shared(n, n_blocks, motion, frame, position, volume, free, f, v, u, work_in, half, dt, c)
-    do block = 1, n_blocks
-      work_in(:, block) = 0.0_wp
-      do k = 1, 2
-        do i = (block - 1) * n_block + 1, min(block * n_block, n)
-          ref = reference_velocity(motion, frame, k, position(i, motion%axis))
-          drag = free(i, k) * c * (v(i, k) - ref)
-          v(i, k) = v(i, k) + half * (free(i, k) * f(i, k) - drag)
-          u(i, k) = u(i, k) + dt * v(i, k)
-          work_in(1, block) = work_in(1, block) + volume(i) * drag * (v(i, k) - ref)
-          work_in(2, block) = work_in(2, block) - volume(i) * drag * ref
-        end do
-      end do
+    call frame_constants(motion, frame, lower1, lower2, slope1, slope2, start, length)
+    drag_work = 0.0_wp
+    frame_work = 0.0_wp
+    !$omp simd private(b, place, ref1, ref2, drag1, drag2)
+    do i = lo, hi
+      b = i - lo + 1
+      place = place_between(start, length, x(i))
+      ref1 = lower1 + slope1 * place
+      ref2 = lower2 + slope2 * place
+      drag1 = free(i, 1) * c * (v(i, 1) - ref1)
+      drag2 = free(i, 2) * c * (v(i, 2) - ref2)
+      v(i, 1) = v(i, 1) + half * (free(i, 1) * f(i, 1) - drag1)
+      v(i, 2) = v(i, 2) + half * (free(i, 2) * f(i, 2) - drag2)
+      u(i, 1) = u(i, 1) + dt * v(i, 1)
+      u(i, 2) = u(i, 2) + dt * v(i, 2)
+      drag_work(b) = volume(i) * (drag1 * (v(i, 1) - ref1) + drag2 * (v(i, 2) - ref2))
+      frame_work(b) = -volume(i) * (drag1 * ref1 + drag2 * ref2)
     end do
-    !$omp end parallel do
-    work = 0.5_wp * dt * sum(work_in, dim=2)
-  end subroutine kick_and_drift
+    work(1) = 0.5_wp * dt * block_sum(drag_work)
+    work(2) = 0.5_wp * dt * block_sum(frame_work)
+  end subroutine kick_and_drift_block
 
   !> Second half kick; `work` as in `kick_and_drift`.
   subroutine kick(motion, frame, position, volume, free, f, v, work)
     type(motion_t), intent(in)    :: motion
     type(frame_t),  intent(in)    :: frame            !! at step n+1
-    real(wp),       intent(in)    :: position(:, :)   !! X (n,2) [m]
-    real(wp),       intent(in)    :: volume(:)        !! V (n) [m^2]
-    real(wp),       intent(in)    :: free(:, :)       !! 1: free, 0: prescribed (n,2)
-    real(wp),       intent(in)    :: f(:, :)          !! f^{n+1} (n,2) [N/m^3]
-    real(wp),       intent(inout) :: v(:, :)          !! v^{n+1/2} -> v^{n+1} (n,2) [m/s]
+    real(wp),       intent(in), contiguous :: position(:, :)   !! X (n,2) [m]
+    real(wp),       intent(in), contiguous :: volume(:)        !! V (n) [m^2]
+    real(wp),       intent(in), contiguous :: free(:, :)       !! 1: free, 0: prescribed (n,2)
+    real(wp),       intent(in), contiguous :: f(:, :)          !! f^{n+1} (n,2) [N/m^3]
+    real(wp),       intent(inout), contiguous :: v(:, :)          !! v^{n+1/2} -> v^{n+1} [m/s]
     real(wp),       intent(out)   :: work(2)          !! [J/m]
     real(wp), allocatable :: work_in(:, :)
-    real(wp) :: half, c, slow_down, ref, drag, v_half
-    integer  :: i, k, block, n, n_blocks
+    integer :: block, n_blocks
 
-    n = size(volume)
-    n_blocks = (n + n_block - 1) / n_block
+    n_blocks = (size(volume) + n_block - 1) / n_block
     allocate (work_in(2, n_blocks))
+    !$omp parallel do schedule(static) default(none) private(block) &
+    !$omp shared(n_blocks, motion, frame, position, volume, free, f, v, work_in)
+    do block = 1, n_blocks
+      call kick_block((block - 1) * n_block + 1, min(block * n_block, size(volume)), &
+        motion, frame, position(:, motion%axis), volume, free, f, v, work_in(:, block))
+    end do
+    !$omp end parallel do
+    work = sum(work_in, dim=2)
+  end subroutine kick
+
+  !> The same for points lo to hi.
+  pure subroutine kick_block(lo, hi, motion, frame, x, volume, free, f, v, work)
+    integer,        intent(in)    :: lo, hi
+    type(motion_t), intent(in)    :: motion
+    type(frame_t),  intent(in)    :: frame
+    real(wp),       intent(in),    contiguous :: x(:)       !! coordinate along motion%axis (n) [m]
+    real(wp),       intent(in),    contiguous :: volume(:), free(:, :), f(:, :)
+    real(wp),       intent(inout), contiguous :: v(:, :)
+    real(wp),       intent(out)   :: work(2)
+    real(wp) :: drag_work(n_block), frame_work(n_block)
+    real(wp) :: half, c, slow_down, lower1, lower2, slope1, slope2, start, length
+    real(wp) :: place, ref1, ref2, drag1, drag2, half1, half2
+    integer  :: i, b
+
     c = motion%damping
     half = 0.5_wp * motion%time_step / motion%density
     slow_down = 1.0_wp / (1.0_wp + half * c)
-    !$omp parallel do schedule(static) default(none) private(i, k, block, ref, drag, v_half) &
-    !$omp shared(n, n_blocks, motion, frame, position, volume, free, f, v, work_in, half, c) &
-    !$omp shared(slow_down)
-    do block = 1, n_blocks
-      work_in(:, block) = 0.0_wp
-      do k = 1, 2
-        do i = (block - 1) * n_block + 1, min(block * n_block, n)
-          ref = reference_velocity(motion, frame, k, position(i, motion%axis))
-          v_half = v(i, k)
-          v(i, k) = v_half + free(i, k) &
-            * ((v_half + half * (f(i, k) + c * ref)) * slow_down - v_half)
-          drag = free(i, k) * c * (v(i, k) - ref)
-          work_in(1, block) = work_in(1, block) + volume(i) * drag * (v_half - ref)
-          work_in(2, block) = work_in(2, block) - volume(i) * drag * ref
-        end do
-      end do
+    call frame_constants(motion, frame, lower1, lower2, slope1, slope2, start, length)
+    drag_work = 0.0_wp
+    frame_work = 0.0_wp
+    !$omp simd private(b, place, ref1, ref2, drag1, drag2, half1, half2)
+    do i = lo, hi
+      b = i - lo + 1
+      place = place_between(start, length, x(i))
+      ref1 = lower1 + slope1 * place
+      ref2 = lower2 + slope2 * place
+      half1 = v(i, 1)
+      half2 = v(i, 2)
+      v(i, 1) = half1 + free(i, 1) * ((half1 + half * (f(i, 1) + c * ref1)) * slow_down - half1)
+      v(i, 2) = half2 + free(i, 2) * ((half2 + half * (f(i, 2) + c * ref2)) * slow_down - half2)
+      drag1 = free(i, 1) * c * (v(i, 1) - ref1)
+      drag2 = free(i, 2) * c * (v(i, 2) - ref2)
+      drag_work(b) = volume(i) * (drag1 * (half1 - ref1) + drag2 * (half2 - ref2))
+      frame_work(b) = -volume(i) * (drag1 * ref1 + drag2 * ref2)
     end do
-    !$omp end parallel do
-    work = 0.5_wp * motion%time_step * sum(work_in, dim=2)
-  end subroutine kick
+    work(1) = 0.5_wp * motion%time_step * block_sum(drag_work)
+    work(2) = 0.5_wp * motion%time_step * block_sum(frame_work)
+  end subroutine kick_block
+
+  !> The frame by numbers, which loops keep in registers.
+  pure subroutine frame_constants(motion, frame, lower1, lower2, slope1, slope2, start, length)
+    type(motion_t), intent(in)  :: motion
+    type(frame_t),  intent(in)  :: frame
+    real(wp),       intent(out) :: lower1, lower2, slope1, slope2   !! [m/s]
+    real(wp),       intent(out) :: start, length                    !! [m]
+
+    lower1 = frame%lower(1)
+    lower2 = frame%lower(2)
+    slope1 = frame%upper(1) - lower1
+    slope2 = frame%upper(2) - lower2
+    start = motion%start
+    length = motion%length
+  end subroutine frame_constants
 
 end module pd_verlet

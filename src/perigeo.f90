@@ -5,28 +5,27 @@
 program perigeo
   use, intrinsic :: iso_fortran_env, only: error_unit, int64, output_unit
   use omp_lib, only: omp_get_max_threads, omp_set_num_threads
-  use pd_boundary, only: boundary_forces, boundary_t, motion_work, move
+  use pd_boundary, only: boundary_forces
   use pd_checkpoint, only: checkpoint_t
   use pd_command_line, only: options_t, print_help, read_command_line
   use pd_errors, only: error_list_t, exit_calculation, exit_command_line, exit_file, exit_input, &
     exit_interrupted, exit_model, exit_ok, exit_terminated, stop_if_any
-  use pd_force, only: force_state
   use pd_input, only: read_input
-  use pd_input_types, only: input_t
   use pd_input_reference, only: write_input_reference
+  use pd_input_types, only: input_t
   use pd_kinds, only: wp
-  use pd_kinematics, only: deformation_gradient
-  use pd_observe, only: kinetic_energy, ledger_t, running_away
+  use pd_observe, only: ledger_t, observation_t, observe, running_away
   use pd_progress, only: progress_due
-  use pd_record, only: close_record, load_checkpoint, open_record, record_failure, &
+  use pd_record, only: close_record, load_checkpoint, observe_state, open_record, record_failure, &
     record_frame, record_line, record_progress, record_row, record_t, results_in_the_way, &
     same_points, save_checkpoint
   use pd_schedule, only: row_due, schedule_t
-  use pd_setup, only: damping_frame, model_t, set_up_body, set_up_model, set_up_schedule, start
+  use pd_setup, only: find_highest_frequency, model_t, set_up_body, set_up_model, &
+    set_up_schedule, start
   use pd_state, only: state_t
+  use pd_step, only: kernel_names, take_step, timing_t
   use pd_summary, only: estimated_seconds, summarise, summary_t
   use pd_system, only: catch_signals, exit_program, pending_signal, sigint
-  use pd_verlet, only: kick, kick_and_drift
   use pd_version, only: code_version, git_hash
   implicit none
 
@@ -37,11 +36,13 @@ program perigeo
   type(state_t)      :: state
   type(ledger_t)     :: ledger
   type(record_t)     :: record
+  type(timing_t)     :: timing
   type(checkpoint_t) :: checkpoint
   type(error_list_t) :: errors, warnings
   real(wp), allocatable :: a(:, :)   ! A = P K^-1 (n,4)
   integer :: step, failed_point
-  integer(int64) :: last_checkpoint
+  logical :: stopping = .false.   ! a signal came, and its checkpoint is written
+  integer(int64) :: last_checkpoint, loop_start
 
   call read_command_line(options, errors)
   call stop_if_any(errors, exit_command_line)
@@ -50,47 +51,17 @@ program perigeo
   call catch_signals()
   call open_outputs()
   call system_clock(last_checkpoint)
+  loop_start = last_checkpoint
 
   do step = checkpoint%step + 1, schedule%steps
-    call take_step()
-    if (failed_point > 0) call fail('det F is not positive')
+    call take_step(step, model, state, a, ledger, timing, failed_point)
+    if (failed_point > 0) call fail('det F is not positive, or not a number')
     call write_what_is_due()
-    if (pending_signal() /= 0) call interrupt()
+    if (stopping) call interrupt()
   end do
   call finish()
 
 contains
-
-  !> One step of velocity Verlet: kick, drift; u gives F, F gives S and A, A gives f; kick.
-  subroutine take_step()
-    type(boundary_t), allocatable :: before(:)
-    real(wp) :: t, t_next, first_work(2), second_work(2), dissipated
-
-    t = real(step - 1, wp) * schedule%time_step
-    t_next = real(step, wp) * schedule%time_step
-    associate (x => model%body%position, volume => model%body%volume, free => model%free, &
-      u => state%displacement, v => state%velocity, f => state%force, &
-      f_grad => state%deformation_gradient)
-      call kick_and_drift(model%motion, damping_frame(model, t), x, volume, free, f, v, u, &
-        first_work)
-      call move(model%boundaries, x, t_next, u, v)
-      call model%operators%gradient(u, f_grad)
-      call deformation_gradient(model%solid%k_inverse, f_grad)
-      call force_state(model%solid, volume, state, a, dissipated, failed_point)
-      call model%operators%divergence(a, f)
-      if (allocated(model%solid%control)) &
-        call model%operators%add_control(model%solid%control, u, f)
-      call kick(model%motion, damping_frame(model, t_next), x, volume, free, f, v, second_work)
-
-      allocate (before(size(model%boundaries)), source=model%boundaries)
-      call boundary_forces(x, volume, f, model%boundaries)
-    end associate
-    ledger%plastic_dissipation = ledger%plastic_dissipation + dissipated
-    ledger%damping_dissipation = ledger%damping_dissipation + first_work(1) + second_work(1)
-    ledger%external_work = ledger%external_work + first_work(2) + second_work(2) &
-      + motion_work(before, model%boundaries, t, t_next)
-    ledger%largest_work = max(ledger%largest_work, abs(ledger%external_work))
-  end subroutine take_step
 
   !> --help, --version, --input-reference.
   subroutine answer_questions()
@@ -107,6 +78,7 @@ contains
     character(:), allocatable :: warning
     type(error_list_t) :: input_errors
     type(summary_t)    :: summary
+    type(observation_t) :: seen
     integer :: i
 
     call read_input(options%input_path, input, errors)
@@ -120,8 +92,9 @@ contains
       if (warning /= '') call warnings%add(warning)
     end if
 
-    call set_up_body(input, model%body, warnings, errors)
-    call stop_if_any(errors, merge(exit_input, exit_model, input%bodies(1)%shape == 'file'))
+    call set_up_body(input, model%body, warnings, input_errors, errors)
+    call stop_if_any(input_errors, exit_input)
+    call stop_if_any(errors, exit_model)
     if (checkpoint%history_rows > 0) then
       if (.not. same_points(checkpoint, model%body)) then
         call errors%add('the points are not those of the checkpoint', input%path)
@@ -133,6 +106,9 @@ contains
     call set_up_schedule(input, checkpoint%time_step, model, schedule, errors)
     call stop_if_any(errors, exit_input)
     if (options%check) then
+      call find_highest_frequency(model)
+      if (schedule%time_step * model%highest_frequency > 2.0_wp) call warnings%add('the time '// &
+        'step is larger than the stable one: the run will not last', '&integration')
       summary = summarise(input, model, schedule)
       write (output_unit, '(a)') options%input_path//': the input is right'
       do i = 1, size(summary%lines)
@@ -145,11 +121,12 @@ contains
 
     allocate (a(model%body%n, 4))
     if (checkpoint%history_rows > 0) then
+      state = state%scattered(model%body%points, model%body%n)
       call boundary_forces(model%body%position, model%body%volume, state%force, model%boundaries)
     else
       call start(model, state)
-      ledger%initial_kinetic_energy = &
-        kinetic_energy(model%body, model%motion%density, state%velocity)
+      call observe(model%body, model%solid, model%operators, state, ledger, seen)
+      ledger%initial_kinetic_energy = seen%kinetic_energy
     end if
   end subroutine set_up
 
@@ -166,20 +143,18 @@ contains
   !> Last line of --check.
   subroutine print_estimate(seconds)
     real(wp), intent(in) :: seconds
-    character(16) :: text
+    character(16) :: text, threads
 
-    write (text, '(i0)') omp_get_max_threads()
-    text = trim(text)//' thread'//merge('s', ' ', omp_get_max_threads() > 1)
+    write (threads, '(i0)') omp_get_max_threads()
     if (seconds < 100.0_wp) then
-      write (output_unit, '(a,f0.1,a)') '  run time            about ', max(0.1_wp, seconds), &
-        ' s with '//trim(text)
+      write (text, '(f12.1,a)') max(0.1_wp, seconds), ' s'
     else if (seconds < 6000.0_wp) then
-      write (output_unit, '(a,f0.1,a)') '  run time            about ', seconds / 60.0_wp, &
-        ' min with '//trim(text)
+      write (text, '(f12.1,a)') seconds / 60.0_wp, ' min'
     else
-      write (output_unit, '(a,f0.1,a)') '  run time            about ', seconds / 3600.0_wp, &
-        ' h with '//trim(text)
+      write (text, '(f12.1,a)') seconds / 3600.0_wp, ' h'
     end if
+    write (output_unit, '(a)') '  run time            about '//trim(adjustl(text))// &
+      ', threads: '//trim(threads)
   end subroutine print_estimate
 
   !> Open all files; the unloaded state is the first row and the first frame.
@@ -203,8 +178,9 @@ contains
     do i = 1, warnings%count()
       call record_line(record, 'warning: '//warnings%message(i), errors)
     end do
+    call observe_state(model, state, ledger, record)
     if (checkpoint%history_rows == 0) then
-      call record_row(model, state, ledger, 0, record, errors)
+      call record_row(model, 0, record, errors)
       if (errors%count() == 0) call record_frame(model, state, 0, record, errors)
     else
       call record_line(record, 'going on from a checkpoint', errors)
@@ -213,38 +189,48 @@ contains
     call stop_if_any(errors, exit_file)
   end subroutine open_outputs
 
-  !> Row, frames, checkpoint and progress after a step; a run that gains energy has failed.
+  !> Row, frames, checkpoint and progress after a step. Before anything of a state is kept it is
+  !> looked at: a run that gains energy has failed.
   subroutine write_what_is_due()
     integer(int64) :: now, rate
+    logical :: row, frame, save_state
     integer :: k
 
-    if (row_due(schedule, step)) then
-      call record_row(model, state, ledger, step, record, errors)
-      call stop_if_any(errors, exit_file)
+    row = row_due(schedule, step)
+    frame = any(schedule%frame_steps == step)
+    stopping = pending_signal() /= 0
+    save_state = stopping
+    if (input%output%checkpoint_every > 0.0_wp) then
+      call system_clock(now, rate)
+      save_state = save_state .or. step == schedule%steps .or. &
+        real(now - last_checkpoint, wp) >= input%output%checkpoint_every * real(rate, wp)
+    end if
+    if (row .or. frame .or. save_state) then
+      call observe_state(model, state, ledger, record)
       if (running_away(record%seen, ledger)) then
         failed_point = fastest_point()
         call fail('the energy runs away')
       end if
     end if
-    do k = 1, size(schedule%frame_steps)
-      if (schedule%frame_steps(k) == step) call record_frame(model, state, step, record, errors)
-    end do
-    if (input%output%checkpoint_every > 0.0_wp) then
-      call system_clock(now, rate)
-      if (real(now - last_checkpoint, wp) >= input%output%checkpoint_every * real(rate, wp) &
-        .or. step == schedule%steps) then
-        call save_checkpoint(model, state, ledger, step, record, errors)
-        last_checkpoint = now
-      end if
+
+    if (row) call record_row(model, step, record, errors)
+    if (frame) then
+      do k = 1, size(schedule%frame_steps)
+        if (schedule%frame_steps(k) == step) call record_frame(model, state, step, record, errors)
+      end do
+    end if
+    if (save_state) then
+      call save_checkpoint(model, state, ledger, step, record, errors)
+      call system_clock(last_checkpoint)
     end if
     if (progress_due(record%progress, step, schedule%steps)) &
       call record_progress(model, schedule, step, record, errors)
     call stop_if_any(errors, exit_file)
   end subroutine write_what_is_due
 
-  !> Where a run that runs away moves fastest.
+  !> Where a run that runs away moves fastest, of the points that move freely.
   integer function fastest_point()
-    fastest_point = maxloc(sum(state%velocity**2, dim=2), dim=1)
+    fastest_point = maxloc(sum((model%free * state%velocity)**2, dim=2), dim=1)
   end function fastest_point
 
   !> The calculation has failed: keep the failing state apart from the good frames, and say where.
@@ -255,29 +241,48 @@ contains
 
     associate (p => failed_point, x => model%body%position)
       write (where, '(a,i0,a,es12.5,a,i0,a,g0.7,a,g0.7,a)') 'step ', step, ', time ', &
-        real(step, wp) * schedule%time_step, ' s, point ', p, ' at (', x(p, 1), ', ', x(p, 2), ') m'
+        real(step, wp) * schedule%time_step, ' s, point ', &
+        count(model%body%points <= p), ' at (', x(p, 1), ', ', x(p, 2), ') m'
     end associate
     call record_failure(model, state, step, record, file_errors)
     call record_line(record, 'the calculation failed: '//reason//'; '//trim(where), file_errors)
-    call errors%add('the calculation failed: '//reason, trim(where), allowed='a smaller safety '// &
-      'or time step may help; the frames and rows before this step are good')
+    call errors%add('the calculation failed: '//reason//'; the frames and rows before this '// &
+      'step are good; a smaller safety or time step may help', trim(where))
     call file_errors%print(error_unit)
     call stop_if_any(errors, exit_calculation)
   end subroutine fail
 
-  !> A signal: write a checkpoint and leave.
+  !> A signal came and its checkpoint is written: leave.
   subroutine interrupt()
     integer :: status
 
     status = merge(exit_interrupted, exit_terminated, pending_signal() == sigint)
-    call save_checkpoint(model, state, ledger, step, record, errors)
     call record_line(record, 'stopped by a signal; --restart goes on from the checkpoint', errors)
     call stop_if_any(errors, exit_file)
     call exit_program(status)
   end subroutine interrupt
 
+  !> Last lines of the log: seconds of the time loop and of its kernels; the rest is output.
+  subroutine tell_where_time_went()
+    integer(int64) :: now, rate
+    character(256) :: line
+    real(wp) :: whole
+    integer  :: k
+
+    call system_clock(now, rate)
+    whole = real(now - loop_start, wp) / real(rate, wp)
+    write (line, '(a,f10.3,a,i0)') 'time loop ', whole, ' s, steps ', &
+      schedule%steps - checkpoint%step
+    call record_line(record, trim(line), errors)
+    write (line, '(a,7(2x,a,f9.3))') 'kernels [s] ', &
+      (trim(kernel_names(k)), timing%seconds(k), k=1, size(kernel_names)), 'output', &
+      max(0.0_wp, whole - sum(timing%seconds))
+    call record_line(record, trim(line), errors)
+  end subroutine tell_where_time_went
+
   !> The end of a run that has reached its end.
   subroutine finish()
+    call tell_where_time_went()
     call close_record(record, errors)
     call stop_if_any(errors, exit_file)
     call exit_program(exit_ok)

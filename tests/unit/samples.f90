@@ -1,6 +1,7 @@
 !> Small bodies, fields and random numbers that the suites of the physics modules share.
 module samples
   use, intrinsic :: iso_fortran_env, only: int64
+  use pd_bond_list, only: bond_list_t, new_bond_list
   use pd_errors, only: error_list_t
   use pd_families, only: horizon_t, new_horizon
   use pd_force, only: control_stiffness, force_state, solid_t
@@ -8,7 +9,6 @@ module samples
   use pd_j2, only: new_j2
   use pd_kinds, only: wp
   use pd_kinematics, only: deformation_gradient, inverse_shape_tensor
-  use pd_operators, only: new_operators, operators_t
   use pd_state, only: state_t
   implicit none
   private
@@ -149,7 +149,7 @@ contains
     type(body_t),      intent(in)    :: body
     real(wp),          intent(in)    :: delta
     type(solid_t),     intent(inout) :: solid
-    type(operators_t), intent(out)   :: operators
+    type(bond_list_t), intent(out)   :: operators
     real(wp),          intent(in), optional :: g
     character(*),      intent(in), optional :: influence
     type(error_list_t) :: errors
@@ -157,10 +157,10 @@ contains
 
     horizon = new_horizon(delta, 'gaussian')
     if (present(influence)) horizon = new_horizon(delta, influence)
-    call new_operators(horizon, body%position, body%volume, operators, errors)
+    call new_bond_list(horizon, body%position, body%volume, operators, errors)
     if (allocated(solid%k_inverse)) deallocate (solid%k_inverse)
     allocate (solid%k_inverse(body%n, 3))
-    call inverse_shape_tensor(operators, body%position, solid%k_inverse, errors)
+    call inverse_shape_tensor(operators, body%position, body%volume, solid%k_inverse, errors)
     if (errors%count() > 0) error stop 'samples: a body that cannot be connected'
     if (.not. present(g)) return
     if (allocated(solid%control)) deallocate (solid%control)
@@ -187,7 +187,7 @@ contains
 
   !> Displacement gives F, S and the internal force density, control included.
   subroutine internal_force(operators, solid, volume, state, dissipated, failed)
-    type(operators_t), intent(in)    :: operators
+    type(bond_list_t), intent(in)    :: operators
     type(solid_t),     intent(in)    :: solid
     real(wp),          intent(in)    :: volume(:)
     type(state_t),     intent(inout) :: state
