@@ -45,7 +45,7 @@ MISTAKES = {
     "value without a key": ("spacing = 0.1", "0.1", "a value without a key in &discretisation"),
     "text outside of groups": ("&output", "rubbish\n&output", "text outside of a group"),
     "name that is a path": ("'case'", "'../case'", "name: not a name; found: '../case'"),
-    "later key": ("name = 'case'", "name = 'case', operators = 'list'", "operators: unknown key"),
+    "later key": ("name = 'case'", "name = 'case', processes = 4", "processes: unknown key"),
     "extent off the lattice": ("x_max = 0.5", "x_max = 0.53", "allowed: nearest 0.5 or 0.6 [m]"),
     "horizon too small": ("= 0.3 /", "= 0.05 /", "the horizon is less than the spacing"),
     "no residual strength": (", residual_strength = 15.0e3", "", "residual_strength: the key is"),

@@ -1,0 +1,108 @@
+"""What the documents name exists: links, files, make targets, options, commands, sections."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+DOCUMENTS = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "doc").glob("*.md"))]
+DOCUMENTS.append(ROOT / "postproc" / "README.md")
+OF_THE_READER = {"input/my_case.nml"}  # the case that the README has its reader make
+FOLDERS = "src|doc|input|tests|tools|postproc"
+
+
+def code_of(text):
+    """Return the code blocks and the code between backquotes of a Markdown text."""
+    fenced = re.findall(r"^```.*?$(.*?)^```", text, re.M | re.S)
+    rest = re.sub(r"^```.*?^```", "", text, flags=re.M | re.S)
+    indented = re.findall(r"^    .*$", rest, re.M)
+    return "\n".join([*fenced, *indented, *re.findall(r"`([^`\n]+)`", rest)])
+
+
+def named(pattern):
+    """Return (document, name) for everything in code that a pattern finds, each once."""
+    found = set()
+    for path in DOCUMENTS:
+        for match in re.finditer(pattern, code_of(path.read_text()), re.M):
+            found.add((str(path.relative_to(ROOT)), match.group(1)))
+    assert found, f"no document has {pattern}: the pattern is out of date"
+    return sorted(found)
+
+
+@pytest.mark.parametrize("path", DOCUMENTS, ids=lambda path: str(path.relative_to(ROOT)))
+def test_relative_links_lead_somewhere(path):
+    links = re.findall(r"\]\(([^)\s]+)\)", path.read_text())
+    local = [link.partition("#")[0] for link in links if "://" not in link]
+    missing = [link for link in local if link and not (path.parent / link).exists()]
+    assert not missing
+
+
+def test_files_that_are_named_exist():
+    files = named(rf"(?<![\w./])((?:{FOLDERS})/[\w./-]*\w)")
+    missing = [(doc, name) for doc, name in files if not (ROOT / name).exists()]
+    assert not [item for item in missing if item[1] not in OF_THE_READER]
+
+
+def test_make_targets_that_are_named_exist():
+    targets = set(re.findall(r"^([a-z-]+):(?!=)", (ROOT / "Makefile").read_text(), re.M))
+    for document, words in named(r"^ *make\b((?: +[\w./=-]+)*)"):
+        asked = [word for word in words.split() if "=" not in word and word[0] != "-"]
+        assert set(asked) <= targets, document
+
+
+def test_post_processing_commands_that_are_named_exist():
+    source = (ROOT / "postproc" / "perigeo_post" / "cli.py").read_text()
+    table = re.search(r"^COMMANDS\b.*?^\}", source, re.M | re.S).group()
+    commands = set(re.findall(r'^    "(\w+)":', table, re.M))
+    assert "contours" in commands
+    for document, command in named(r"perigeo-post +(\w+)"):
+        assert command in commands, document
+
+
+def test_options_of_the_program_that_are_named_exist():
+    source = (ROOT / "src" / "pd_command_line.f90").read_text()
+    for document, words in named(r"(?:^|/)perigeo((?: +[-\w./]+)*)"):
+        for option in re.findall(r"--[\w-]+", words):
+            assert f"'{option}'" in source, document
+
+
+def test_sections_of_the_theory_that_the_sources_name_exist():
+    theory = (ROOT / "doc" / "theory.md").read_text()
+    sections = set(re.findall(r"^## (\d+)\. ", theory, re.M))
+    for path in sorted((ROOT / "src").glob("*.f90")):
+        for reference in re.findall(r"theory\.md, sections? ([\d, toand]+)", path.read_text()):
+            assert set(re.findall(r"\d+", reference)) <= sections, path.name
+
+
+def test_the_results_page_lists_every_column_and_field():
+    page = (ROOT / "doc" / "results.md").read_text()
+    history = (ROOT / "src" / "pd_history.f90").read_text()
+    header = re.search(r"function header\b.*?end function", history, re.S).group()
+    words = re.findall(r"\w+", " ".join(re.findall(r"'([^']+)'", header)))
+    frames = (ROOT / "src" / "pd_frames.f90").read_text()
+    fields = re.findall(r"field_t\('(\w+)'", frames)
+    assert len(words) > 12
+    assert len(fields) > 5
+    columns = [f"<boundary>{word}" if word[0] == "_" else word for word in words]
+    assert not [name for name in [*columns, *fields] if f"`{name}`" not in page]
+
+
+def test_the_results_page_lists_every_attribute_of_the_file():
+    page = (ROOT / "doc" / "results.md").read_text()
+    source = (ROOT / "src" / "pd_result.f90").read_text()
+    attributes = re.findall(r"write_attribute\(file, '/', '(\w+)'", source)
+    assert len(attributes) > 10
+    assert not [name for name in attributes if f"`{name}`" not in page]
+
+
+def test_the_version_to_cite_is_the_version():
+    version = (ROOT / "VERSION").read_text().strip()
+    assert f"\nversion: {version}\n" in (ROOT / "CITATION.cff").read_text()
+    assert f"\n## {version}\n" in (ROOT / "CHANGELOG.md").read_text()
+
+
+def test_the_picture_of_the_readme_is_small():
+    sizes = {path.name: path.stat().st_size for path in (ROOT / "doc" / "figures").glob("*")}
+    assert sizes
+    assert max(sizes.values()) < 150_000, sizes

@@ -1,0 +1,185 @@
+"""Runs that are stopped, killed and restarted end like a run that was left alone."""
+
+import random
+import signal
+import subprocess
+import time
+
+import h5py
+import pytest
+from case_files import SPECIMEN, changed, contents, history, same_points_and_frames
+
+# Long enough to be hit in the middle by a signal, with many rows and frames.
+LONG = changed(SPECIMEN, final_strain="0.04", history_count="400", spacing="0.05", horizon="0.16")
+LONG = LONG.replace("frame_strains = 0.004, 0.01", "frame_count = 20")
+END = "final_strain = 0.04"
+
+
+@pytest.fixture(scope="module")
+def straight(run_case, tmp_path_factory):
+    """Results of a run that was left alone."""
+    folder = tmp_path_factory.mktemp("straight")
+    done = run_case(LONG, folder, "--quiet", "--threads", "1")
+    assert done.returncode == 0, done.stderr
+    return folder / "out"
+
+
+def begin(program, folder, text, *options):
+    """Start the long run in the background."""
+    (folder / "run.nml").write_text(text)
+    return subprocess.Popen(
+        [program, "--quiet", "--threads", "1", *options, "run.nml"],
+        cwd=folder,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+
+
+def stop(process, number, folder, rows):
+    """Send a signal when the history has grown to some rows; return the exit status."""
+    path = folder / "out" / "case_history.csv"
+    while process.poll() is None:
+        if path.exists() and path.read_bytes().count(b"\n") > rows:
+            process.send_signal(number)
+            break
+        time.sleep(0.001)
+    return process.wait(timeout=300)
+
+
+def assert_same(folder, straight):
+    """Assert that history and frames are those of the run that was left alone."""
+    assert (folder / "case_history.csv").read_bytes() == (
+        straight / "case_history.csv"
+    ).read_bytes()
+    with (
+        h5py.File(folder / "case.h5", locking=False) as one,
+        h5py.File(straight / "case.h5", locking=False) as other,
+    ):
+        assert one.attrs["complete"] == 1
+        same_points_and_frames(one, other)
+
+
+@pytest.mark.parametrize(("number", "status"), [(signal.SIGTERM, 143), (signal.SIGINT, 130)])
+def test_a_run_that_was_stopped_goes_on_as_if_it_were_not(
+    program, run_case, tmp_path, straight, number, status
+):
+    process = begin(program, tmp_path, LONG)
+    assert stop(process, number, tmp_path, random.randint(2, 200)) == status
+    assert (tmp_path / "out" / "case_checkpoint.h5").exists()
+    rows = history(tmp_path / "out" / "case_history.csv")
+    assert len(rows["step"]) < 401
+    with h5py.File(tmp_path / "out" / "case.h5", locking=False) as file:
+        assert file.attrs["complete"] == 0
+    done = run_case(LONG, tmp_path, "--restart", "--quiet")
+    assert done.returncode == 0, done.stderr
+    assert_same(tmp_path / "out", straight)
+
+
+def test_a_run_may_be_stopped_twice(program, run_case, tmp_path, straight):
+    assert stop(begin(program, tmp_path, LONG), signal.SIGINT, tmp_path, 60) == 130
+    process = begin(program, tmp_path, LONG, "--restart")
+    assert stop(process, signal.SIGTERM, tmp_path, 200) == 143
+    assert run_case(LONG, tmp_path, "--restart", "--quiet").returncode == 0
+    assert_same(tmp_path / "out", straight)
+
+
+def test_a_run_that_was_killed_goes_on_from_its_last_checkpoint(
+    program, run_case, tmp_path, straight
+):
+    text = LONG.replace("history_count", "checkpoint_every = 0.02, history_count")
+    process = begin(program, tmp_path, text)
+    checkpoint = tmp_path / "out" / "case_checkpoint_previous.h5"
+    while process.poll() is None and not checkpoint.exists():
+        time.sleep(0.001)
+    assert stop(process, signal.SIGKILL, tmp_path, 100) == -9
+    with h5py.File(tmp_path / "out" / "case.h5", locking=False) as file:
+        assert file.attrs["complete"] == 0
+        assert file["frames/000000"].attrs["written"] == 1
+        assert file["frames/000000/displacement"].shape == file["points/position"].shape
+        for frame in file["frames"].values():
+            assert frame["stress"].shape[1] == 4
+    done = run_case(LONG, tmp_path, "--restart", "--quiet")
+    assert done.returncode == 0, done.stderr
+    assert_same(tmp_path / "out", straight)
+
+
+def test_a_spoilt_checkpoint_is_passed_over(program, run_case, tmp_path, straight):
+    assert stop(begin(program, tmp_path, LONG), signal.SIGTERM, tmp_path, 60) == 143
+    process = begin(program, tmp_path, LONG, "--restart")
+    assert stop(process, signal.SIGTERM, tmp_path, 200) == 143
+    assert (tmp_path / "out" / "case_checkpoint_previous.h5").exists()
+    newest = tmp_path / "out" / "case_checkpoint.h5"
+    newest.write_bytes(newest.read_bytes()[:1000])
+    done = run_case(LONG, tmp_path, "--restart")
+    assert done.returncode == 0, done.stderr
+    assert "checkpoint" in done.stdout
+    assert_same(tmp_path / "out", straight)
+
+
+@pytest.fixture(scope="module")
+def stopped(program, tmp_path_factory):
+    """Folder of a run that was stopped; not to be changed."""
+    folder = tmp_path_factory.mktemp("stopped")
+    assert stop(begin(program, folder, LONG), signal.SIGTERM, folder, 100) == 143
+    return folder / "out"
+
+
+@pytest.fixture
+def copy(stopped, tmp_path):
+    """A copy of the run that was stopped."""
+    (tmp_path / "out").mkdir()
+    for name, data in contents(stopped).items():
+        (tmp_path / "out" / name).write_bytes(data)
+    return tmp_path
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "key"),
+    [
+        ("youngs_modulus = 50.0e6", "youngs_modulus = 50.1e6", "material.youngs_modulus"),
+        ("yield_stress = 0.15e6", "yield_stress = 0.14e6", "material.yield_stress"),
+        ("horizon = 0.16", "horizon = 0.17", "discretisation.horizon"),
+        ("x_max = 0.5", "x_max = 0.55", "x_max"),
+        ("damping = 5.0e5", "damping = 4.0e5", "integration.damping"),
+        ("velocity = 0.0, -0.01", "velocity = 0.0, -0.02", "velocity"),
+        ("amplitude = 1.0e-3", "amplitude = 1.0e-2", "imperfection.amplitude"),
+    ],
+)
+def test_a_restart_with_another_model_is_refused_by_name(run_case, copy, old, new, key):
+    before = contents(copy / "out")
+    assert old in LONG
+    done = run_case(LONG.replace(old, new), copy, "--restart")
+    assert done.returncode == 2, done.stdout
+    assert key.split(".")[-1] in done.stderr
+    assert contents(copy / "out") == before
+
+
+def test_a_restart_may_end_later(run_case, copy):
+    done = run_case(LONG.replace(END, "final_strain = 0.042"), copy, "--restart", "--quiet")
+    assert done.returncode == 0, done.stderr
+    rows = history(copy / "out" / "case_history.csv")
+    assert rows["strain"][-1] >= 0.042
+    assert (rows["step"][1:] > rows["step"][:-1]).all()
+
+
+def test_a_restart_may_ask_for_other_frames(run_case, copy, straight):
+    text = LONG.replace("frame_count = 20", "frame_times = 3.9, 4.0")
+    done = run_case(text, copy, "--restart", "--quiet")
+    assert done.returncode == 0, done.stderr
+    with (
+        h5py.File(copy / "out" / "case.h5", locking=False) as one,
+        h5py.File(straight / "case.h5", locking=False) as other,
+    ):
+        last = one["frames"][list(one["frames"])[-1]]
+        end = other["frames"][list(other["frames"])[-1]]
+        assert last.attrs["step"] == end.attrs["step"]
+        assert (last["displacement"][()] == end["displacement"][()]).all()
+        assert [frame.attrs["written"] for frame in one["frames"].values()] == [1] * len(
+            one["frames"]
+        )
+
+
+def test_results_of_a_stopped_run_are_not_overwritten_unasked(run_case, copy):
+    before = contents(copy / "out")
+    assert run_case(LONG, copy).returncode == 5
+    assert contents(copy / "out") == before

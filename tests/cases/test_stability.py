@@ -1,0 +1,103 @@
+"""The default time step never lets a run diverge, whatever the body; a longer one does."""
+
+import itertools
+import math
+
+import numpy as np
+import pytest
+from case_files import history
+
+SPACING, DENSITY, YOUNGS = 0.1, 2000.0, 50.0e6
+STEPS = 300  # about
+
+# 10 x 12 points, pushed suddenly at one end, without damping: all frequencies are in the motion,
+# and nothing takes energy out of it. The rule of the time step is left to its default.
+PUSHED = """\
+&run name = 'case', output_dir = 'out', operators = '{form}' /
+&discretisation spacing = 0.1, horizon = {horizon}, layout = '{layout}', volumes = '{volumes}'
+  influence = '{influence}' /
+&body x_min = 0.0, x_max = {width}, y_min = 0.0, y_max = {height} /
+&material model = 'elastic', density = 2000.0, youngs_modulus = 50.0e6, poissons_ratio = {nu} /
+&boundary name = 'low', side = 'bottom' /
+&boundary name = 'high', side = 'top', velocity = {velocity}, -{velocity} /
+&integration end_time = {end} {step} /
+&output frame_count = 1, history_count = 100 /
+"""
+CONTROLS = (0.0, 0.01, 1.0)
+INFLUENCES = ("gaussian", "constant", "conical")
+RATIOS = (0.0, 0.3, 0.49)
+LAYOUTS = ("nodes", "cells")
+VOLUMES = ("uniform", "tributary")
+FORMS = ("lattice", "list")
+
+
+def wave_speed(nu):
+    """Return the speed of compression waves."""
+    return math.sqrt(YOUNGS * (1 - nu) / ((1 + nu) * (1 - 2 * nu) * DENSITY))
+
+
+def pushed(m, influence, control, nu, layout, volumes, form="lattice", step=None):
+    """Return the input of a run of some hundreds of steps, by the default rule or a fixed step."""
+    c_p = wave_speed(nu)
+    extra = 1 if layout == "nodes" else 0
+    text = PUSHED.format(
+        form=form,
+        horizon=repr(m * SPACING),
+        layout=layout,
+        volumes=volumes,
+        influence=influence,
+        width=repr(round((10 - extra) * SPACING, 6)),
+        height=repr(round((12 - extra) * SPACING, 6)),
+        nu=nu,
+        velocity=repr(1e-6 * c_p),
+        end=repr(STEPS * (step or 0.8 * m * SPACING / c_p)),
+        step=f", time_step_rule = 'fixed', time_step = {step!r}" if step else "",
+    )
+    if control:
+        text += f"&stabilisation method = 'silling', factor = {control} /\n"
+    return text
+
+
+def grid():
+    """Return every m with every influence function and control; the rest takes turns."""
+    rest = list(itertools.product(RATIOS, LAYOUTS, VOLUMES, FORMS))
+    cases = []
+    for m, influence, control in itertools.product(range(1, 9), INFLUENCES, CONTROLS):
+        if influence == "conical" and m < 2:
+            continue
+        cases.append((m, influence, control, *rest[(7 * len(cases)) % len(rest)]))
+    return cases
+
+
+def test_the_grid_holds_every_pair_of_values():
+    columns = list(zip(*grid()))
+    for one, other in itertools.combinations(range(len(columns)), 2):
+        pairs = set(zip(columns[one], columns[other]))
+        expected = set(itertools.product(set(columns[one]), set(columns[other])))
+        assert pairs >= {p for p in expected if p != (1, "conical")}, (one, other)
+
+
+@pytest.mark.parametrize("case", grid(), ids=lambda case: "-".join(map(str, case)))
+def test_no_run_diverges_with_the_default_time_step(run_case, tmp_path, case):
+    done = run_case(pushed(*case), tmp_path, "--quiet", "--threads", "1")
+    assert done.returncode == 0, done.stderr
+    rows = history(tmp_path / "out" / "case_history.csv")
+    assert rows["step"][-1] > 100
+    # a sudden start leaves an error in the first rows, when there is hardly any work
+    error = np.abs(rows["energy_error"])
+    assert error.max() < 0.2
+    assert error[20:].max() < 0.02
+    assert error[-1] < 2e-3
+
+
+@pytest.mark.parametrize("control", CONTROLS)
+@pytest.mark.parametrize("m", [1, 2, 4, 8])
+def test_a_step_one_tenth_beyond_the_limit_diverges(run_case, tmp_path, m, control):
+    case = (m, "gaussian", control, 0.3, "nodes", "uniform")
+    checked = run_case(pushed(*case), tmp_path, "--check")
+    assert checked.returncode == 0, checked.stderr
+    limit = float(checked.stdout.split("2/omega_max = ")[1].split()[0])
+    for factor, status in ((0.99, 0), (1.1, 4)):
+        text = pushed(*case, step=factor * limit)
+        done = run_case(text, tmp_path, "--force", "--quiet", "--threads", "1")
+        assert done.returncode == status, (factor, done.stderr)
