@@ -1,7 +1,9 @@
 """Make hourglass.txt: points of a body whose sides are curved, so that no lattice fits.
 
-Rows of points at equal distances in y; in every row the same number of points divides the width of
-the body at that height. Each point owns its part of the row. Usage: python3 make_hourglass.py > hourglass.txt
+Rows of points at equal distances in y; in every row the same number of points divides the width
+of the body at that height. Each point owns its part of the row.
+
+Usage: python3 make_hourglass.py > hourglass.txt
 """
 
 import math

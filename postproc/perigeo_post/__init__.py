@@ -1,10 +1,14 @@
 """Results of perigeo in Python: reader, measures and figures.
 
+Example::
+
     from perigeo_post import Run, measure_band, contour_figure, save_figure
 
     run = Run("results/compression/compression.h5")
     print(measure_band(run, strain=0.01).as_dict())
     save_figure(contour_figure(run.frames()[1:]), "bands.pdf")
+
+Everything that the command line does is a function here.
 """
 
 from .animation import animate

@@ -316,9 +316,7 @@ def _coarse(work: _Field, signs: tuple[int, ...], keep: BoolArray) -> tuple[_Axi
     return best[1], best[0]
 
 
-def _refine(
-    work: _Field, line: _Axis, crossed: tuple[_Axis, float] | None
-) -> tuple[_Axis, _Ridge]:
+def _refine(work: _Field, line: _Axis, crossed: tuple[_Axis, float] | None) -> tuple[_Axis, _Ridge]:
     """Fit the line to the ridge near it, four times over."""
     for _ in range(4):
         ridge = _follow(work, line, crossed)

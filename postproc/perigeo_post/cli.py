@@ -43,9 +43,7 @@ def strain_value(text: str) -> float:
     try:
         return float(text[:-1]) / 100.0 if text.endswith("%") else float(text)
     except ValueError:
-        raise argparse.ArgumentTypeError(
-            f"'{text}' is not a strain; write 0.01 or 1%"
-        ) from None
+        raise argparse.ArgumentTypeError(f"'{text}' is not a strain; write 0.01 or 1%") from None
 
 
 # ---- options shared by commands --------------------------------------------------------------

@@ -213,9 +213,7 @@ def common_extent(panels: Sequence[Panel]) -> FloatArray:
     return np.concatenate([low - margin, high + margin])
 
 
-def fill_axes(
-    panels: Sequence[Panel], axes: Sequence[Axes], scale: Scale, columns: int
-) -> Any:
+def fill_axes(panels: Sequence[Panel], axes: Sequence[Axes], scale: Scale, columns: int) -> Any:
     """Draw panels into a grid of axes with common limits; returns what a colour bar needs."""
     x0, y0, x1, y1 = common_extent(panels)
     drawn: Any = None
@@ -299,9 +297,7 @@ def contour_figure(
     return figure
 
 
-def add_colour_bar(
-    figure: Any, drawn: Any, axes: Sequence[Axes], field: str, scale: Scale
-) -> None:
+def add_colour_bar(figure: Any, drawn: Any, axes: Sequence[Axes], field: str, scale: Scale) -> None:
     """A colour bar with the name and unit of the field beside the axes."""
     bar = figure.colorbar(drawn, ax=list(axes), extend=scale.extend, pad=0.02, aspect=25)
     bar.set_label(with_unit(label_of(field), scale.unit))

@@ -79,11 +79,7 @@ def write_curves(path: str | Path, curves: Sequence[Curve]) -> Path:
     pairs = {(c.x_name, c.x_unit, c.y_name, c.y_unit) for c in curves}
     if len(pairs) == 1:
         x_name, x_unit, y_name, y_unit = pairs.pop()
-        rows = [
-            {"run": c.label, x_name: x, y_name: y}
-            for c in curves
-            for x, y in zip(c.x, c.y)
-        ]
+        rows = [{"run": c.label, x_name: x, y_name: y} for c in curves for x, y in zip(c.x, c.y)]
         return write_rows(path, rows, {x_name: x_unit, y_name: y_unit})
     rows = [
         {"curve": c.label, "x_name": c.x_name, "x_unit": c.x_unit, "x": x, "y_name": c.y_name,

@@ -201,9 +201,7 @@ def _history_facts(run: Run) -> dict[str, Any]:
     }
     if run.platens is not None:
         try:
-            facts.update(
-                {k: v for k, v in curve_numbers(run).items() if k not in ("run", "file")}
-            )
+            facts.update({k: v for k, v in curve_numbers(run).items() if k not in ("run", "file")})
         except FieldNotFoundError as error:
             facts["curve_missing"] = str(error)
     if "energy_error" in history and history.rows:

@@ -296,8 +296,7 @@ class Run:
     def provenance(self) -> dict[str, Any]:
         """Program version, compiler, command line and the like."""
         keys = (
-            "code_version git_hash compiler flags command_line host threads created"
-            " schema_version"
+            "code_version git_hash compiler flags command_line host threads created schema_version"
         )
         return {key: self.attributes[key] for key in keys.split() if key in self.attributes}
 

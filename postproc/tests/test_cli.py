@@ -110,9 +110,7 @@ def test_contours_of_chosen_states(result: Path, tmp_path: Path, capsys: Capture
     assert len(table.read_text().splitlines()) == 1 + 26 * 55
 
 
-def test_band_prints_what_the_contract_names(
-    result: Path, tmp_path: Path, capsys: Capture
-) -> None:
+def test_band_prints_what_the_contract_names(result: Path, tmp_path: Path, capsys: Capture) -> None:
     csv, table = tmp_path / "p.csv", tmp_path / "t.csv"
     found = numbers(capsys, "band", result, "--json", "--csv", csv, "--table", table)
     for key in ("width", "peak", "angle", "position", "line", "strain"):

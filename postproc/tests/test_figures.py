@@ -64,9 +64,7 @@ def test_figures_have_the_widths_of_columns(result: Path) -> None:
     assert stress_strain_figure([run]).get_size_inches()[0] * 25.4 == pytest.approx(88.0)
 
 
-def test_a_cloud_and_a_failing_state_are_drawn(
-    cloud: Path, failed: Path, tmp_path: Path
-) -> None:
+def test_a_cloud_and_a_failing_state_are_drawn(cloud: Path, failed: Path, tmp_path: Path) -> None:
     assert_drawn(save_figure(contour_figure(Run(cloud).frames()), tmp_path / "cloud.png"))
     frames = Run(failed).frames(include_invalid=True)
     assert_drawn(save_figure(contour_figure(frames, deformed=2.0), tmp_path / "failed.png"))

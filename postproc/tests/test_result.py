@@ -72,9 +72,7 @@ def test_derived_fields_follow_their_definitions(result: Path) -> None:
     x, y = frame.run.positions.T
     assert frame["mean_stress"] == pytest.approx(-(1e3 + 170e3 + 50e3) / 3)
     assert frame["pressure"] == pytest.approx((1e3 + 170e3 + 50e3) / 3)
-    assert frame["displacement_magnitude"] == pytest.approx(
-        np.hypot(0.3 * 0.016 * x, 0.016 * y)
-    )
+    assert frame["displacement_magnitude"] == pytest.approx(np.hypot(0.3 * 0.016 * x, 0.016 * y))
     assert frame["max_shear_stress"] == pytest.approx(np.hypot(84.5e3, 20e3 * (x - 0.5)))
     assert frame["volumetric_strain"] == pytest.approx(0.3 * 0.016 - 0.016 + 0.01)
 
@@ -85,9 +83,7 @@ def test_von_mises_is_derived_where_the_file_has_none(result: Path) -> None:
     frame = Run(result).last_frame
     xx, yy, zz = -1e3, -170e3, -50e3
     xy = 20e3 * (frame.run.positions[:, 0] - 0.5)
-    expected = np.sqrt(
-        0.5 * ((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2) + 3.0 * xy**2
-    )
+    expected = np.sqrt(0.5 * ((xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2) + 3.0 * xy**2)
     assert frame["von_mises"] == pytest.approx(expected)
 
 

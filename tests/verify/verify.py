@@ -5,6 +5,7 @@ printed as a table (quantity, exact, computed, error, tolerance, verdict), and w
 results/verify/verify.json and verify.md; exit status 1 when one of them fails.
 
     verify.py [CASE ...]   only these cases (names: verify.py --list)
+    verify.py --publish    all cases, and the table into doc/verification.md
 """
 
 from __future__ import annotations
@@ -227,14 +228,18 @@ def uniaxial() -> list[Row]:
 
 
 def plateau() -> list[Row]:
-    """Perfectly plastic specimen: 2 sigma_y / sqrt(3). Stiff, so that strains stay small."""
+    """Perfectly plastic specimen: 2 sigma_y / sqrt(3).
+
+    Stiff, and slow by the same factor, so that strains and the drag of the damping stay small.
+    """
+    stiff = 100.0
     groups = [
         *specimen(0.05, 0.15, volumes="tributary"),
-        material(youngs_modulus=20.0 * E),
-        *platens("smooth", rate=0.01),
+        material(youngs_modulus=stiff * E),
+        *platens("smooth", rate=0.2 / stiff),
         (
             "integration",
-            {"final_strain": 2.0e-3, "damping": 2.0e6, "damping_frame": "platens"},
+            {"final_strain": 0.04 / stiff, "damping": 2.0e6, "damping_frame": "platens"},
         ),
         ("output", {"history_count": 400, "frame_count": 1}),
     ]
@@ -246,7 +251,7 @@ def plateau() -> list[Row]:
             "kPa",
             2.0 * SIGMA_Y / ROOT_3 / 1e3,
             float(curve.y[-1]) / 1e3,
-            1.0e-2,
+            5.0e-3,
             "closed form",
         )
     ]
@@ -420,7 +425,7 @@ def wave() -> list[Row]:
             "kPa",
             RHO * C_P * speed / 1e3,
             behind / 1e3,
-            1.0e-2,
+            2.0e-2,
             "closed form",
         ),
     ]
@@ -553,16 +558,30 @@ def save(rows: list[Row], results: Path) -> None:
     (results / "verify.json").write_text(json.dumps(data, indent=1) + "\n")
     lines = table(rows)
     lines.insert(1, ["---"] * len(lines[0]))
-    version = subprocess.run([str(PROGRAM), "--version"], capture_output=True, text=True, check=True)
+    command = [str(PROGRAM), "--version"]
+    version = subprocess.run(command, capture_output=True, text=True, check=True)
     text = [f"Printed by `make verify`, {version.stdout.strip()}, {platform.machine()}, "]
     text[0] += f"{date.today().isoformat()}:\n"
     text += ["| " + " | ".join(line) + " |" for line in lines]
     (results / "verify.md").write_text("\n".join(text) + "\n")
 
 
+def publish() -> None:
+    """Put verify.md between the markers of doc/verification.md."""
+    page = ROOT / "doc" / "verification.md"
+    begin, end = "<!-- verify: begin -->", "<!-- verify: end -->"
+    before, rest = page.read_text().split(begin)
+    after = rest.split(end)[1]
+    table_text = (RESULTS / "verify.md").read_text()
+    page.write_text(f"{before}{begin}\n{table_text}{end}{after}")
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("cases", nargs="*", metavar="CASE", help="only these cases")
+    parser.add_argument(
+        "--publish", action="store_true", help="put the table into doc/verification.md"
+    )
     parser.add_argument("--list", action="store_true", help="list the cases")
     arguments = parser.parse_args()
     unknown = set(arguments.cases) - set(CASES)
@@ -582,6 +601,8 @@ def main() -> int:
     print_table(rows)
     if not arguments.cases:
         save(rows, RESULTS)
+    if arguments.publish and not arguments.cases:
+        publish()
     for failure in failures:
         print("could not run:", failure, file=sys.stderr)
     failed = len(failures) + sum(not row.passed for row in rows)
