@@ -55,7 +55,8 @@ self_test() {
   trap 'rm -rf "$folder"' EXIT
   write() { printf '%s\n' "module $2" "  ${3:-implicit none}" "end module $2" > "$folder/$1.f90"; }
   expect() {
-    if check "$folder" pd_a pd_b pd_version pd_c > "$folder/said"; then found=clean; else found=wrong; fi
+    found=clean
+    check "$folder" pd_a pd_b pd_version pd_c > "$folder/said" || found=wrong
     if [ $found != "$1" ] ||
         { [ -n "$2" ] && ! grep -q "$2" "$folder/said"; }; then
       echo "the layer check is broken: $3: expected $1, found $found" >&2

@@ -23,9 +23,9 @@ fi
 
 # The environment does not survive a move of the folder or of its Python: both are in the stamp.
 wanted=$(echo "$level $(pwd -P) $(cksum < postproc/pyproject.toml)")
+installed='import sys, importlib.util as u; sys.exit(not u.find_spec("perigeo_post"))'
 if [ -x $venv/bin/python ] && [ "$(cat $stamp 2>/dev/null)" = "$wanted" ] &&
-    $venv/bin/python -c 'import sys, importlib.util as u; sys.exit(not u.find_spec("perigeo_post"))' \
-      2>/dev/null; then
+    $venv/bin/python -c "$installed" 2>/dev/null; then
   exit 0
 fi
 

@@ -189,7 +189,8 @@ for attempt in first second; do
     echo "Still missing after the installation:$missing"
     case $missing in
       *hdf5*)
-        echo "If an h5fc of another HDF5 comes first in PATH, name the right one: H5FC=/usr/bin/h5fc"
+        echo "If the h5fc of another HDF5 comes first in PATH, name the right one:"
+        echo "  H5FC=/usr/bin/h5fc"
         ;;
     esac
     show_by_hand
