@@ -283,6 +283,7 @@ contains
   !> The end of a run that has reached its end.
   subroutine finish()
     call tell_where_time_went()
+    call record_line(record, 'results in '//record%stem//'.h5, .xdmf, _history.csv', errors)
     call close_record(record, errors)
     call stop_if_any(errors, exit_file)
     call exit_program(exit_ok)
