@@ -83,11 +83,11 @@ contains
   end function summarise
 
   !> Memory of a run [bytes]: bonds, fields of the state (23 numbers a point), what is fixed (12),
-  !> work space (4), a frame on its way to the disk (18).
+  !> work space (4), a frame on its way to the disk (29).
   pure real(wp) function memory(model)
     type(model_t), intent(in) :: model
 
-    memory = model%operators%memory() + real(model%body%n, wp) * 8.0_wp * (23 + 12 + 4 + 18)
+    memory = model%operators%memory() + real(model%body%n, wp) * 8.0_wp * (23 + 12 + 4 + 29)
   end function memory
 
   !> Wall clock time of the run [s], from the fastest of a few applications of the linear operator
