@@ -65,6 +65,7 @@ contains
     call fill_stabilisation(group_named(groups, 'stabilisation', 1, input%path), input)
     call fill_integration(group_named(groups, 'integration', 1, input%path), input)
     call fill_imperfection(group_named(groups, 'imperfection', 1, input%path), input)
+    call fill_random_field(group_named(groups, 'random_field', 1, input%path), input)
     call fill_output(group_named(groups, 'output', 1, input%path), input)
   end subroutine fill
 
@@ -169,6 +170,17 @@ contains
     if (.not. is_given(group, 'y')) input%imperfection%y = 0.0_wp
     if (.not. is_given(group, 'radius')) input%imperfection%radius = 0.0_wp
   end subroutine fill_imperfection
+
+  subroutine fill_random_field(group, input)
+    type(namelist_group_t), intent(in)    :: group
+    type(input_t),          intent(inout) :: input
+
+    associate (f => input%random_field)
+      call take_real(group, 'coefficient_of_variation', f%coefficient_of_variation)
+      call take_real(group, 'correlation_length', f%correlation_length)
+      call take_integer(group, 'seed', f%seed)
+    end associate
+  end subroutine fill_random_field
 
   subroutine fill_output(group, input)
     type(namelist_group_t), intent(in)    :: group

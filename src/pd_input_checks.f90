@@ -5,7 +5,7 @@
 module pd_input_checks
   use pd_errors, only: error_list_t
   use pd_input_types, only: body_input_t, input_t
-  use pd_input_values, only: group_named, is_damaged, is_given
+  use pd_input_values, only: count_groups, group_named, is_damaged, is_given
   use pd_kinds, only: is_set, wp
   use pd_namelist, only: max_problems, namelist_group_t, place_of
   use pd_text, only: integer_text, number_text
@@ -36,6 +36,8 @@ contains
     call check_material(input, group_named(groups, 'material', 1, input%path), errors)
     call check_stabilisation(input, group_named(groups, 'stabilisation', 1, input%path), errors)
     call check_imperfection(input, group_named(groups, 'imperfection', 1, input%path), errors)
+    if (count_groups(groups, 'random_field') > 0) &
+      call check_random_field(input, group_named(groups, 'random_field', 1, input%path), errors)
   end subroutine check_model
 
   !> Whether the body is a point cloud.
@@ -382,5 +384,17 @@ contains
           //' [Pa]')
     end associate
   end subroutine check_imperfection
+
+  !> A run that asks for soil that varies must not go on without it: not even with 'elastic'.
+  subroutine check_random_field(input, group, errors)
+    type(input_t),          intent(in)    :: input
+    type(namelist_group_t), intent(in)    :: group
+    type(error_list_t),     intent(inout) :: errors
+
+    if (input%material%model == 'elastic') call errors%add( &
+      'a random field of the yield stress for a material that does not yield', &
+      where=place_of(group), found='model = ''elastic''', &
+      allowed='model = ''j2'', or leave the group out')
+  end subroutine check_random_field
 
 end module pd_input_checks

@@ -9,7 +9,7 @@ module pd_input_types
 
   public :: input_t, run_input_t, discretisation_input_t, body_input_t, material_input_t
   public :: boundary_input_t, stabilisation_input_t, integration_input_t, imperfection_input_t
-  public :: output_input_t
+  public :: random_field_input_t, output_input_t
 
   type :: run_input_t
     character(:), allocatable :: title, name, output_dir
@@ -67,6 +67,12 @@ module pd_input_types
     real(wp) :: x = 0.0_wp, y = 0.0_wp, radius = 0.0_wp   !! [m]
   end type imperfection_input_t
 
+  type :: random_field_input_t
+    real(wp) :: coefficient_of_variation = unset       !! unset: no field
+    real(wp) :: correlation_length = unset             !! [m]
+    integer  :: seed = 1
+  end type random_field_input_t
+
   type :: output_input_t
     real(wp), allocatable :: frame_strains(:)          !! size 0: not given
     real(wp), allocatable :: frame_times(:)            !! [s]; size 0: not given
@@ -86,6 +92,7 @@ module pd_input_types
     type(stabilisation_input_t)  :: stabilisation
     type(integration_input_t)    :: integration
     type(imperfection_input_t)   :: imperfection
+    type(random_field_input_t)   :: random_field
     type(output_input_t)         :: output
     !> Index into `boundaries` of the platens: two boundaries that cover opposite sides whole, with
     !> none on the other two sides; 0, 0 where there are none. The first is 'bottom' or 'left'.

@@ -20,7 +20,7 @@ module pd_j2
     real(wp) :: shear_modulus = 0.0_wp     !! G
     real(wp) :: kinematic_modulus = 0.0_wp !! H_k
     real(wp) :: isotropic_modulus = 0.0_wp !! H_i
-    real(wp) :: residual_strength = 0.0_wp !! sigma_r
+    real(wp) :: residual_strength = 0.0_wp !! sigma_r; at weaker points sigma_y0 takes its place
   end type j2_t
 
   !> What a point remembers.
@@ -171,7 +171,7 @@ contains
         call shrink_to_residual(material, &
           q(i) - (3.0_wp * material%shear_modulus + material%kinematic_modulus) * first(i), &
           strength_now(material, points%yield_stress(i), points%alpha(i) + first(i)), &
-          direction, beta, rest)
+          min(material%residual_strength, points%yield_stress(i)), direction, beta, rest)
         flow(i, :) = direction
         points%back_stress(i, :) = beta
         da(i) = first(i) + rest
@@ -220,7 +220,8 @@ contains
   !>
   !> `first` ends where sigma_y(alpha) meets sigma_r, or where the back stress b - h da n, with
   !> b = sqrt(3/2) beta and h = -H_k, meets its bound r - k da, k = -H_i, r = sigma_y - sigma_r
-  !> (sigma_y0 where H_i >= 0: the bound then stays): the smallest root da >= 0 of
+  !> (sigma_y0 where H_i >= 0: the bound then stays; sigma_r is at most sigma_y0): the smallest
+  !> root da >= 0 of
   !> (h^2 - k^2) da^2 - 2 (h b . n - r k) da - (r^2 - b . b) = 0, in the form that does not cancel.
   !> Written without a branch: every quotient is finite, also where it is not used.
   pure subroutine increments(material, n, points, q, flow, first, da)
@@ -229,7 +230,7 @@ contains
     type(yielding_t), intent(in)  :: points
     real(wp),         intent(in)  :: q(n_block), flow(n_block, 4)
     real(wp),         intent(out) :: first(n_block), da(n_block)
-    real(wp) :: g3, h, k, hi, modulus, modulus_left, residual, square, floor_strength
+    real(wp) :: g3, h, k, hi, modulus, modulus_left, residual, square, floor_strength, lowest
     real(wp) :: strength, r, f, room, bb, bn, linear, rest, reach, over, under, left
     real(wp) :: square_or_tiny, one_over_k, edge, no_bound, no_floor
     integer  :: i
@@ -249,12 +250,14 @@ contains
     square_or_tiny = merge(square, tiny_modulus, square > 0.0_wp)
     no_bound = merge(0.0_wp, far, h > 0.0_wp)
     edge = merge(no_bound, far, square > 0.0_wp)
-    !$omp simd private(strength, r, f, room, bb, bn, linear, rest, reach, over, under, left)
+    !$omp simd private(strength, r, f, room, bb, bn, linear, rest, reach, over, under, left) &
+    !$omp private(lowest)
     do i = 1, n
-      strength = max(floor_strength, points%yield_stress(i) + hi * points%alpha(i))
+      lowest = min(floor_strength, points%yield_stress(i))
+      strength = max(lowest, points%yield_stress(i) + hi * points%alpha(i))
       f = max(0.0_wp, q(i) - strength)
       r = points%yield_stress(i) - k * points%alpha(i)
-      r = max(floor_strength, r) - residual
+      r = max(lowest, r) - min(residual, points%yield_stress(i))
       room = r * one_over_k + no_floor
       bb = 1.5_wp * (points%back_stress(i, 1)**2 + points%back_stress(i, 2)**2 &
         + points%back_stress(i, 3)**2 + 2.0_wp * points%back_stress(i, 4)**2)
@@ -312,7 +315,8 @@ contains
     !$omp simd
     do i = 1, n
       points%alpha(i) = points%alpha(i) + da(i)
-      radius(i) = root_2_3 * max(floor_strength, points%yield_stress(i) + hi * points%alpha(i))
+      radius(i) = root_2_3 * max(min(floor_strength, points%yield_stress(i)), &
+        points%yield_stress(i) + hi * points%alpha(i))
     end do
     do c = 1, 4
       !$omp simd private(back)
@@ -445,18 +449,21 @@ contains
       etayy = g2 * (eyy - mean) - back_stress(i, 2)
       etazz = g2 * (ezz - mean) - back_stress(i, 3)
       etaxy = g2 * exy - back_stress(i, 4)
-      strength = max(floor_strength, yield_stress(i) + material%isotropic_modulus * alpha(i))
+      strength = max(min(floor_strength, yield_stress(i)), &
+        yield_stress(i) + material%isotropic_modulus * alpha(i))
       excess(b) = 1.5_wp * (etaxx**2 + etayy**2 + etazz**2 + 2.0_wp * etaxy**2) - strength**2
     end do
   end subroutine trial_block
 
-  !> sigma_y(alpha): isotropic softening ends at the residual strength, hardening has no end.
+  !> sigma_y(alpha): isotropic softening ends at the residual strength, hardening has no end. A
+  !> point that is weaker than that from the start does not soften.
   pure real(wp) function strength_now(material, yield_stress, alpha) result(strength)
     type(j2_t), intent(in) :: material
     real(wp),   intent(in) :: yield_stress, alpha
 
     strength = yield_stress + material%isotropic_modulus * alpha
-    if (material%isotropic_modulus < 0.0_wp) strength = max(strength, material%residual_strength)
+    if (material%isotropic_modulus < 0.0_wp) &
+      strength = max(strength, min(material%residual_strength, yield_stress))
   end function strength_now
 
   !> The rest of a return when both moduli are negative and the back stress has met its bound R.
@@ -465,10 +472,11 @@ contains
   !> bound, b <- b (1 - k da2 / R), k = |H_i|, which turns the flow direction e + (k da2 / R) b;
   !> da2 solves |e + (k da2 / R) b| - 3 G da2 = sigma_y1 - k da2, a quadratic. When nothing is left
   !> of b the strength is the residual one and da3 is the rest.
-  pure subroutine shrink_to_residual(material, q, strength, n, beta, da)
+  pure subroutine shrink_to_residual(material, q, strength, residual, n, beta, da)
     type(j2_t), intent(in)    :: material
     real(wp),   intent(in)    :: q         !! |e| = q* - (3 G + H_k) da1 [Pa]
     real(wp),   intent(in)    :: strength  !! sigma_y1 = sigma_y(alpha + da1) [Pa]
+    real(wp),   intent(in)    :: residual  !! sigma_r, at most sigma_y0 [Pa]
     real(wp),   intent(inout) :: n(4)      !! flow direction, |n| = 1
     real(wp),   intent(inout) :: beta(4)   !! back stress after da1, then at the end [Pa]
     real(wp),   intent(out)   :: da        !! da2 + da3
@@ -477,7 +485,7 @@ contains
 
     g3 = 3.0_wp * material%shear_modulus
     k = -material%isotropic_modulus
-    r = max(0.0_wp, strength - material%residual_strength)
+    r = max(0.0_wp, strength - residual)
     b = root_3_2 * beta
     e = q * n
     da = 0.0_wp
@@ -499,7 +507,7 @@ contains
     end if
     if (spent) then
       beta = 0.0_wp
-      da = da + (norm(e) - g3 * da - material%residual_strength) / g3
+      da = da + (norm(e) - g3 * da - residual) / g3
     else
       beta = beta * (1.0_wp - k * da / r)
     end if

@@ -26,7 +26,7 @@ module pd_keys
 
   integer, parameter :: any_count = 0
   integer, parameter :: max_frames = 100000, max_rows = 1000000
-  integer, parameter :: length = 24, long = 240
+  integer, parameter :: length = 32, long = 240
 
   !> One key. Texts: `choices` are the words allowed, apart by blanks (none: any text), `is_name`
   !> asks for a-z, 0-9 and _. Numbers: `count` is how many are due (any_count: one or more).
@@ -58,7 +58,7 @@ contains
   pure function group_table() result(groups)
     type(group_key_t), allocatable :: groups(:)
 
-    allocate (groups(9))
+    allocate (groups(10))
     groups(1) = group_key_t('run', required=.true., meaning='names of the run and of its files')
     groups(2) = group_key_t('discretisation', required=.true., &
                             meaning='points, horizon and weights')
@@ -70,7 +70,8 @@ contains
     groups(7) = group_key_t('integration', required=.true., &
                             meaning='end of the run, time step and damping')
     groups(8) = group_key_t('imperfection', meaning='a weak patch that seeds a shear band')
-    groups(9) = group_key_t('output', meaning='what is written and when')
+    groups(9) = group_key_t('random_field', meaning='a yield stress that varies')
+    groups(10) = group_key_t('output', meaning='what is written and when')
   end function group_table
 
   !> All keys, group by group.
@@ -88,6 +89,7 @@ contains
     call declare_boundary(list, n)
     call declare_integration(list, n)
     call declare_imperfection(list, n)
+    call declare_random_field(list, n)
     call declare_output(list, n)
     allocate (keys(n))
     keys = list(:n)
@@ -281,6 +283,21 @@ contains
     call declare(list, n, key_t(group, 'radius', unit='m', range=not_negative, &
       also='above 0 where amplitude is', meaning='radius of the patch'))
   end subroutine declare_imperfection
+
+  pure subroutine declare_random_field(list, n)
+    type(key_t), intent(inout) :: list(:)
+    integer,     intent(inout) :: n
+    character(*), parameter :: group = 'random_field'
+
+    call declare(list, n, key_t(group, 'coefficient_of_variation', unit='1', required=.true., &
+      range=positive, meaning='standard deviation of the yield stress over its mean, yield_stress'))
+    call declare(list, n, key_t(group, 'correlation_length', unit='m', required=.true., &
+      range=positive, also='a warning where it is below 2 spacing', &
+      meaning='distance at which the correlation has fallen to 1/e'))
+    call declare(list, n, key_t(group, 'seed', kind_integer, unit='1', default='1', &
+      range=not_negative, also='at most nine digits', &
+      meaning='number of the soil: each seed gives another one'))
+  end subroutine declare_random_field
 
   pure subroutine declare_output(list, n)
     type(key_t), intent(inout) :: list(:)

@@ -126,6 +126,8 @@ contains
       description%position = body%position(places, :)
       description%volume = body%volume(places)
       description%boundary = body%boundary(places)
+      if (model%solid%material%plastic) &
+        description%yield_stress = model%solid%yield_stress(places)
     end associate
     allocate (character(64) :: description%boundary_names(size(model%boundaries)))
     do k = 1, size(model%boundaries)

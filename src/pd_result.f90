@@ -45,6 +45,7 @@ module pd_result
     real(wp), allocatable :: position(:, :)    !! (n,2) [m]
     real(wp), allocatable :: volume(:)         !! (n) [m^2]
     integer,  allocatable :: boundary(:)       !! (n) 0: body, k: boundary k
+    real(wp), allocatable :: yield_stress(:)   !! (n) [Pa]; not allocated: a material without one
     character(:), allocatable :: boundary_names(:)
   end type run_description_t
 
@@ -54,6 +55,7 @@ module pd_result
     integer :: n = 0                   !! points
     integer :: n_frames = 0            !! frames with a place in the file, 000000 among them
     logical :: has_strain = .false.    !! whether there are platens
+    logical :: yields = .false.        !! whether the points have a yield stress
     integer :: written = 0             !! frames written so far
     character(:), allocatable :: grids !! of these frames, for the XDMF file
   end type result_t
@@ -217,6 +219,7 @@ contains
     result%n = size(description%volume)
     result%n_frames = n_frames
     result%has_strain = description%strain_axis /= 'none'
+    result%yields = allocated(description%yield_stress)
     result%grids = ''
   end subroutine describe_result
 
@@ -296,6 +299,10 @@ contains
     call write_dataset(file, '/points/boundary', description%boundary, errors)
     call label(file, '/points/boundary', '1', 'boundary that a fictitious point belongs to, ' &
       //'counted from 1; 0: a point of the body', errors)
+    if (allocated(description%yield_stress)) then
+      call write_dataset(file, '/points/yield_stress', description%yield_stress, errors)
+      call label(file, '/points/yield_stress', 'Pa', 'initial yield stress', errors)
+    end if
     if (size(description%boundary_names) == 0) return
     call write_dataset(file, '/points/boundary_names', description%boundary_names, errors)
     call label(file, '/points/boundary_names', '1', 'names of the boundaries', errors)
@@ -369,7 +376,7 @@ contains
 
     result%written = result%written + 1
     result%grids = result%grids//xdmf_grid(result%path(index(result%path, '/', back=.true.) + 1:), &
-      result%n, fields_of_a_frame, index_of_frame, time)
+      result%n, fields_of_a_frame, index_of_frame, time, result%yields)
   end subroutine note_frame
 
   subroutine renew_xdmf(result, errors)

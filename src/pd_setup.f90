@@ -17,6 +17,8 @@ module pd_setup
   use pd_kinematics, only: inverse_shape_tensor
   use pd_lattice, only: lattice_operators_t, new_lattice_operators
   use pd_operators, only: operators_t
+  use pd_random_field, only: lognormal, longest_way, new_random_field, &
+    standard_normal
   use pd_schedule, only: new_schedule, schedule_t
   use pd_stability, only: highest_frequency, wave_speed
   use pd_state, only: state_t
@@ -60,7 +62,24 @@ contains
     else
       call rectangle_body(input, body, warnings, errors)
     end if
+    if (is_set(input%random_field%correlation_length) .and. allocated(body%position)) &
+      call look_at_scales(input%random_field%correlation_length, input%discretisation%spacing, &
+      maxval(abs(body%position)), warnings, errors)
   end subroutine set_up_body
+
+  !> Whether a random field can be shown by the points, and whether it can be computed.
+  subroutine look_at_scales(correlation_length, spacing, farthest, warnings, errors)
+    real(wp),           intent(in)    :: correlation_length, spacing   !! [m]
+    real(wp),           intent(in)    :: farthest                      !! largest coordinate [m]
+    type(error_list_t), intent(inout) :: warnings, errors
+    character(*), parameter :: where = '&random_field correlation_length'
+
+    if (farthest > longest_way * correlation_length) then
+      call errors%add('the coordinates are more than 1e8 correlation lengths', where)
+    else if (correlation_length < 2.0_wp * spacing) then
+      call warnings%add('less than 2 spacings: the points cannot show how the soil varies', where)
+    end if
+  end subroutine look_at_scales
 
   !> Body from a point cloud. Where the input gives its real extent, that counts.
   subroutine cloud_body(input, body, input_errors, errors)
@@ -171,26 +190,20 @@ contains
     end if
   end subroutine choose_operators
 
-  !> Material, its flaw, zero-energy control.
+  !> Material, yield stress, zero-energy control.
   subroutine set_up_solid(input, model)
     type(input_t), intent(in)    :: input
     type(model_t), intent(inout) :: model
-    integer  :: i
-    real(wp) :: distance
 
-    associate (m => input%material, flaw => input%imperfection, solid => model%solid)
+    associate (m => input%material, solid => model%solid)
       solid%density = m%density
       solid%material = new_j2(m%youngs_modulus, m%poissons_ratio)
       solid%material%plastic = m%model == 'j2'
       solid%material%kinematic_modulus = m%kinematic_modulus
       solid%material%isotropic_modulus = m%isotropic_modulus
       solid%material%residual_strength = max(0.0_wp, m%residual_strength)
-      allocate (solid%yield_stress(model%body%n), source=m%yield_stress)
-      do i = 1, model%body%n
-        distance = norm2(model%body%position(i, :) - [flaw%x, flaw%y])
-        if (flaw%amplitude > 0.0_wp .and. distance <= flaw%radius * (1.0_wp + 1.0e-6_wp)) &
-          solid%yield_stress(i) = (1.0_wp - flaw%amplitude) * solid%yield_stress(i)
-      end do
+      allocate (solid%yield_stress(model%body%n))
+      call set_up_yield_stress(input, model%body%position, solid%yield_stress)
       if (input%stabilisation%method == 'silling') then
         allocate (solid%control(model%body%n), source=control_stiffness( &
           input%stabilisation%factor, m%youngs_modulus, model%delta, model%operators%weight_sum))
@@ -198,6 +211,29 @@ contains
       end if
     end associate
   end subroutine set_up_solid
+
+  !> sigma_y0 of every point: the same everywhere or a random field, reduced in the weak patch.
+  subroutine set_up_yield_stress(input, position, yield_stress)
+    type(input_t), intent(in)  :: input
+    real(wp),      intent(in),  contiguous :: position(:, :)    !! X (n,2) [m]
+    real(wp),      intent(out), contiguous :: yield_stress(:)   !! (n) [Pa]
+    integer :: i
+
+    associate (mean => max(0.0_wp, input%material%yield_stress), field => input%random_field, &
+      flaw => input%imperfection)
+      yield_stress = mean
+      if (is_set(field%coefficient_of_variation)) then
+        call standard_normal(new_random_field(field%correlation_length, field%seed), position, &
+          yield_stress)
+        yield_stress = lognormal(mean, field%coefficient_of_variation, yield_stress)
+      end if
+      if (flaw%amplitude <= 0.0_wp) return
+      do i = 1, size(yield_stress)
+        if (norm2(position(i, :) - [flaw%x, flaw%y]) <= flaw%radius * (1.0_wp + 1.0e-6_wp)) &
+          yield_stress(i) = (1.0_wp - flaw%amplitude) * yield_stress(i)
+      end do
+    end associate
+  end subroutine set_up_yield_stress
 
   !> Boundaries with their motions, platens, damping.
   subroutine set_up_boundaries(input, model)

@@ -2,8 +2,9 @@
 module pd_summary
   use, intrinsic :: iso_fortran_env, only: int64
   use pd_force, only: linear_force
-  use pd_input_types, only: input_t
-  use pd_kinds, only: wp
+  use pd_input_types, only: input_t, random_field_input_t
+  use pd_kinds, only: is_set, wp
+  use pd_random_field, only: spread_of, spread_t
   use pd_schedule, only: schedule_t
   use pd_setup, only: model_t
   use pd_stability, only: wave_speed
@@ -63,6 +64,7 @@ contains
       call summary%add('horizon', number(model%delta)//' m, spacing '// &
         number(model%spacing)//' m: m = '//number(model%delta / model%spacing))
       call summary%add('wave speed', 'c_p = '//number(wave_speed(model%solid))//' m/s')
+      call add_field(input%random_field, model, summary)
       courant = model%spacing / wave_speed(model%solid)
       text = number(schedule%time_step)//' s = '//number(schedule%time_step / courant)// &
         ' dx/c_p, rule '//input%integration%time_step_rule
@@ -81,6 +83,32 @@ contains
       call summary%add('memory', number(memory(model) / 1.0e6_wp)//' MB')
     end associate
   end function summarise
+
+  !> The random field and what it has come to over the body, the weak patch included.
+  subroutine add_field(field, model, summary)
+    type(random_field_input_t), intent(in)    :: field
+    type(model_t),              intent(in)    :: model
+    type(summary_t),            intent(inout) :: summary
+    type(spread_t) :: spread
+    integer :: weaker
+
+    if (.not. is_set(field%coefficient_of_variation)) return
+    associate (strength => model%solid%yield_stress, material => model%solid%material, &
+      inside => model%body%boundary == 0)
+      spread = spread_of(strength, model%body%volume, inside)
+      weaker = 0
+      if (min(material%kinematic_modulus, material%isotropic_modulus) < 0.0_wp) &
+        weaker = count(inside .and. strength < material%residual_strength)
+    end associate
+    call summary%add('random field', 'coefficient of variation '// &
+      number(field%coefficient_of_variation)//', correlation length '// &
+      number(field%correlation_length)//' m, seed '//whole(field%seed))
+    call summary%add('yield stress', 'mean '//number(spread%mean)//' Pa, coefficient of '// &
+      'variation '//number(spread%variation)//', from '//number(spread%smallest)//' to '// &
+      number(spread%largest)//' Pa')
+    if (weaker > 0) call summary%add('no softening', 'at '//whole(weaker)//' points, which are '// &
+      'weaker than residual_strength')
+  end subroutine add_field
 
   !> Memory of a run [bytes]: bonds, fields of the state (23 numbers a point), what is fixed (12),
   !> work space (4), a frame on its way to the disk (29).

@@ -131,6 +131,11 @@ contains
       call lines%add_real('imperfection.y', p%y)
       call lines%add_real('imperfection.radius', p%radius)
     end associate
+    associate (f => input%random_field)
+      call lines%add_real('random_field.coefficient_of_variation', f%coefficient_of_variation)
+      call lines%add_real('random_field.correlation_length', f%correlation_length)
+      call lines%add_integer('random_field.seed', f%seed)
+    end associate
     associate (o => input%output)
       call lines%add_reals('output.frame_strains', o%frame_strains)
       call lines%add_reals('output.frame_times', o%frame_times)

@@ -40,12 +40,13 @@ contains
   end subroutine write_xdmf
 
   !> The grid of one frame.
-  pure function xdmf_grid(data_file, n, fields, index_of_frame, at_time) result(text)
+  pure function xdmf_grid(data_file, n, fields, index_of_frame, at_time, yields) result(text)
     character(*),  intent(in) :: data_file        !! name of the HDF5 file, without its folder
     integer,       intent(in) :: n                !! number of points
     type(field_t), intent(in) :: fields(:)
     integer,       intent(in) :: index_of_frame   !! k of /frames/k, written with six digits
     real(wp),      intent(in) :: at_time          !! [s]
+    logical,       intent(in) :: yields           !! the points have a yield stress
     character(:), allocatable :: text, source
     character(24) :: time
     character(6)  :: group
@@ -61,6 +62,8 @@ contains
       //whole_item(source//'position', integer_text(n)//' 2', 'Float', 8)//'</Geometry>'//nl &
       //attribute('volume', 'Scalar', whole_item(source//'volume', integer_text(n), 'Float', 8)) &
       //attribute('boundary', 'Scalar', whole_item(source//'boundary', integer_text(n), 'Int', 4))
+    if (yields) text = text//attribute('yield_stress', 'Scalar', &
+      whole_item(source//'yield_stress', integer_text(n), 'Float', 8))
     source = escaped(data_file)//':/frames/'//group//'/'
     do i = 1, size(fields)
       text = text//field_text(source//trim(fields(i)%name), n, fields(i))

@@ -14,6 +14,7 @@ from .sampling import FloatArray
 TENSOR = ("xx", "yy", "zz", "xy")
 DEFAULT_COMPONENTS: dict[int, tuple[str, ...]] = {2: ("x", "y"), 4: TENSOR}
 VECTORS = ("displacement", "velocity")
+OF_THE_POINTS = ("yield_stress",)  # stand once in the file, and are the same in every frame
 
 
 @dataclass(frozen=True)
@@ -84,6 +85,7 @@ DERIVED: dict[str, _Derived] = {
 _LABELS = {
     "plastic_strain": "Equivalent plastic strain α",
     "von_mises": "Von Mises stress",
+    "yield_stress": "Initial yield stress",
     "zero_energy": "Zero-energy measure",
     "mean_stress": "Mean stress (tension positive)",
     "pressure": "Pressure",

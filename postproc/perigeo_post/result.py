@@ -120,7 +120,10 @@ class Frame:
         return self.field(name).values
 
     def _stored(self, name: str) -> Field | None:
-        return self.run._dataset(f"{self.key}/{name}", name)
+        found = self.run._dataset(f"{self.key}/{name}", name)
+        if found is None and name in _fields.OF_THE_POINTS:
+            found = self.run._dataset(f"points/{name}", name)
+        return found
 
 
 class Run:
@@ -459,12 +462,13 @@ class Run:
 
     @cached_property
     def field_names(self) -> list[str]:
-        """Names of all fields of the frames, stored and derived."""
+        """Names of all fields: of the frames, stored and derived, and of the points."""
 
         def read(file: Any) -> dict[str, int]:
             for name in sorted(file["frames"]):
                 group = file["frames"][name]
-                return {key: len(group[key].shape) for key in group}
+                fixed = [key for key in _fields.OF_THE_POINTS if key in file["points"]]
+                return {key: len(group[key].shape) for key in group} | dict.fromkeys(fixed, 1)
             return {}
 
         stored: dict[str, int] = self._read(read)

@@ -158,6 +158,14 @@ def _frame(
         _dataset(file, f"{key}/{name}", data, unit, text, parts)
 
 
+def add_yield_stress(path: Path) -> np.ndarray:
+    """Give the points of a result a yield stress, every one another."""
+    with h5py.File(path, "a") as file:
+        values = 1e5 + np.arange(len(file["points/volume"]), dtype=float)
+        _dataset(file, "points/yield_stress", values, "Pa", "initial yield stress", "")
+    return values
+
+
 def write_history(path: Path, modulus: float = 50e6, nu: float = 0.3, rows: int = 400) -> Path:
     """Linear up to 0.34 % strain, then softening; modulus and peak known."""
     strain = np.linspace(0.0, 0.016, rows)

@@ -96,6 +96,17 @@ def test_json_and_a_figure_can_be_had_together(
     assert not list(result.parent.glob("made_plastic*"))
 
 
+def test_the_yield_stress_is_named_and_drawn(result: Path, tmp_path: Path, capsys: Capture) -> None:
+    values = synthetic.add_yield_stress(result)
+    assert main(["info", str(result)]) == 0
+    assert "yield_stress" in capsys.readouterr().out
+    figure = tmp_path / "soil.png"
+    argv = ["contours", result, "--field", "yield_stress", "--frame", 0]
+    (found,) = numbers(capsys, *argv, "--json", "--fictitious", "-o", figure)
+    assert_drawn(figure)
+    assert (found["min"], found["max"], found["unit"]) == (values[0], values[-1], "Pa")
+
+
 def test_contours_of_chosen_states(result: Path, tmp_path: Path, capsys: Capture) -> None:
     figure = tmp_path / "row.png"
     argv = ["contours", str(result), "--strain", "0.5%", "0.016", "-o", str(figure)]

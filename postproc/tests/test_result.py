@@ -95,6 +95,20 @@ def test_an_unknown_field_is_answered_with_the_nearest_name(result: Path) -> Non
         frame.scalar("stress")
 
 
+def test_the_yield_stress_of_the_points_is_a_field_of_every_frame(result: Path) -> None:
+    assert "yield_stress" not in Run(result).field_names
+    with pytest.raises(FieldNotFoundError, match="no field 'yield_stress'"):
+        Run(result).last_frame.field("yield_stress")
+    values = synthetic.add_yield_stress(result)
+    run = Run(result)
+    assert "yield_stress" in run.field_names
+    for frame in run.frames():
+        assert (frame["yield_stress"] == values).all()
+    assert run.last_frame.scalar("yield_stress").unit == "Pa"
+    with pytest.raises(FieldNotFoundError):
+        run.last_frame.field("volume")  # of the other data of the points none becomes a field
+
+
 def test_every_listed_field_can_be_read(result: Path) -> None:
     run = Run(result)
     n = len(run.positions)

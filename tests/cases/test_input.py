@@ -53,6 +53,32 @@ MISTAKES = {
     "platens apart": ("-0.01", "0.01", "the platens do not approach each other"),
     "no platens": ("side = 'top'", "side = 'left'", "the key needs platens, and there are none"),
     "frame beyond the end": ("0.0005, 0.001", "0.002", "a frame beyond the end of the run"),
+    "field without variation": (
+        "&output",
+        "&random_field coefficient_of_variation = 0.0, correlation_length = 0.3 / &output",
+        "&random_field coefficient_of_variation: out of range; found: 0.0; allowed: > 0",
+    ),
+    "field of negative length": (
+        "&output",
+        "&random_field coefficient_of_variation = 0.2, correlation_length = -0.3 / &output",
+        "&random_field correlation_length: out of range; found: -0.3; allowed: > 0 [m]",
+    ),
+    "field without a length": (
+        "&output",
+        "&random_field coefficient_of_variation = 0.2 / &output",
+        "&random_field correlation_length: the key is missing; allowed: > 0 [m]",
+    ),
+    "seed that is no whole number": (
+        "&output",
+        "&random_field coefficient_of_variation=0.2, correlation_length=0.3, seed=1.5/ &output",
+        "&random_field seed: not a whole number; found: 1.5; allowed: a whole number >= 0",
+    ),
+    "field for an elastic body": (
+        "'j2', density = 2000.0, youngs_modulus = 50.0e6, poissons_ratio = 0.3\n",
+        "'elastic', density = 2000.0, youngs_modulus = 50.0e6, poissons_ratio = 0.3 /\n"
+        "&random_field coefficient_of_variation = 0.2, correlation_length = 0.3 / ! ",
+        "&random_field: a random field of the yield stress for a material that does not yield",
+    ),
     "cloud that is not there": (
         "x_min = 0.0, x_max = 0.5, y_min = 0.0, y_max = 1.0",
         "shape = 'file', file = 'none.txt'",

@@ -79,6 +79,11 @@ def test_the_points_are_those_of_the_input(results):
             "top",
         ]
         assert file["points/volume"][()] == pytest.approx(0.01)
+        strength = file["points/yield_stress"][()]
+        near = np.hypot(x[:, 0], x[:, 1] - 0.3) < 0.1101
+        assert near.sum() == 4
+        assert strength == pytest.approx(np.where(near, 0.999 * 0.15e6, 0.15e6), rel=1e-14)
+        assert text(file["points/yield_stress"].attrs["unit"]) == "Pa"
 
 
 def test_frames_follow_the_history(results):
@@ -128,6 +133,8 @@ def test_a_vtk_reader_sees_every_frame_and_field(results):
             assert position[:, :2] == pytest.approx(file["points/position"][()])
             data = grid.GetPointData()
             names = {data.GetArrayName(k) for k in range(data.GetNumberOfArrays())}
+            strength = file["points/yield_stress"][()]
+            assert vtk_to_numpy(data.GetArray("yield_stress")) == pytest.approx(strength)
             tensors = {f"{name}_{k}" for name in ("stress", "strain") for k in COMPONENTS}
             assert names >= set(DATASETS) - {"stress", "strain"} | tensors | {"boundary"}
             for name in ("plastic_strain", "von_mises", "zero_energy"):

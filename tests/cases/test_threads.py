@@ -10,12 +10,15 @@ TEXT = changed(
 ).replace("frame_strains = 0.004, 0.01", "frame_count = 3")
 
 
-@pytest.mark.parametrize("control", ["", CONTROL], ids=["without control", "with control"])
-def test_history_and_frames_have_the_same_bits(run_case, tmp_path, control):
+FIELD = "&random_field coefficient_of_variation = 0.2, correlation_length = 0.2 /\n"
+
+
+@pytest.mark.parametrize("more", ["", CONTROL, FIELD], ids=["plain", "with control", "with field"])
+def test_history_and_frames_have_the_same_bits(run_case, tmp_path, more):
     results = []
     for threads in (1, 2, 3):
         done = run_case(
-            TEXT + control,
+            TEXT + more,
             tmp_path,
             *("--quiet", "--threads", threads, "--output", f"out{threads}"),
             OMP_WAIT_POLICY="passive",
