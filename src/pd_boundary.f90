@@ -9,6 +9,7 @@ module pd_boundary
   private
 
   public :: table_t, boundary_t, platens_t, new_rigid_boundary, new_affine_boundary
+  public :: new_ramp, control_by_force
   public :: move, boundary_forces, motion_work, mark_free, nominal_strain, time_of_strain
   public :: reference_ends
 
@@ -27,6 +28,9 @@ module pd_boundary
     integer, allocatable :: points(:)
     logical :: affine = .false.
     logical :: prescribed(2) = .false.       !! components whose motion is prescribed
+    logical :: held(2) = .false.             !! components in which all points move as one
+    real(wp) :: applied(2) = 0.0_wp          !! force on these from outside, at full load [N/m]
+    type(table_t) :: factor                  !! on `applied`; allocated where any is held
     real(wp) :: gradient(4) = 0.0_wp         !! L xx xy yx yy [1/s]; affine only
     type(table_t) :: tables(2)               !! rigid: velocity x, y [m/s]; affine: factor, -
     real(wp) :: force(2) = 0.0_wp            !! that the boundary applies to the body [N/m]
@@ -128,6 +132,34 @@ contains
     boundary%tables(2) = factor
   end function new_affine_boundary
 
+  !> A factor that rises linearly from 0 to 1 in a time, and is 1 at once where that is 0.
+  pure function new_ramp(duration) result(factor)
+    real(wp), intent(in) :: duration   !! [s]
+    type(table_t) :: factor
+
+    if (duration > 0.0_wp) then
+      allocate (factor%times(2), factor%rates(2))
+      factor%times = [0.0_wp, duration]
+      factor%rates = [0.0_wp, 1.0_wp]
+    else
+      allocate (factor%times(1), source=0.0_wp)
+      allocate (factor%rates(1), source=1.0_wp)
+    end if
+  end function new_ramp
+
+  !> Let a given force move a rigid boundary in the components that were prescribed. The boundary
+  !> translates and does not rotate; its mass is that of its points.
+  pure subroutine control_by_force(force, factor, boundary)
+    real(wp),         intent(in)    :: force(2)   !! from outside, at full load [N/m]
+    type(table_t),    intent(in)    :: factor
+    type(boundary_t), intent(inout) :: boundary
+
+    boundary%held = boundary%prescribed
+    boundary%prescribed = .false.
+    boundary%applied = merge(force, 0.0_wp, boundary%held)
+    boundary%factor = factor
+  end subroutine control_by_force
+
   !> Vector L X.
   pure function affine_mode(gradient, x) result(m)
     real(wp), intent(in) :: gradient(4), x(2)
@@ -193,12 +225,15 @@ contains
     end do
   end subroutine move
 
-  !> Force that each boundary applies to the body, - sum V f over its prescribed components, and
-  !> the forces conjugate to its modes.
-  pure subroutine boundary_forces(position, volume, f, boundaries)
+  !> Force that each boundary applies to the body, - sum V f of the internal forces over its
+  !> prescribed components, and the forces conjugate to its modes.
+  !>
+  !> Where a boundary is held, f contains the force applied to it; the rest is internal.
+  pure subroutine boundary_forces(position, volume, t, f, boundaries)
     real(wp),         intent(in)    :: position(:, :)   !! X (n,2) [m]
     real(wp),         intent(in)    :: volume(:)        !! V (n) [m^2]
-    real(wp),         intent(in)    :: f(:, :)          !! internal force density (n,2) [N/m^3]
+    real(wp),         intent(in)    :: t                !! [s]
+    real(wp),         intent(in)    :: f(:, :)          !! force density, with loads (n,2) [N/m^3]
     type(boundary_t), intent(inout) :: boundaries(:)
     integer :: b, k, p
 
@@ -208,10 +243,13 @@ contains
         boundary%mode_force = 0.0_wp
         do k = 1, size(boundary%points)
           p = boundary%points(k)
-          where (boundary%prescribed) boundary%force = boundary%force - volume(p) * f(p, :)
+          where (boundary%prescribed .or. boundary%held) &
+            boundary%force = boundary%force - volume(p) * f(p, :)
           if (boundary%affine) boundary%mode_force(1) = boundary%mode_force(1) &
             - volume(p) * sum(f(p, :) * affine_mode(boundary%gradient, position(p, :)))
         end do
+        if (any(boundary%held)) &
+          boundary%force = boundary%force + boundary%factor%rate(t) * boundary%applied
         if (.not. boundary%affine) boundary%mode_force = boundary%force
       end associate
     end do
@@ -238,14 +276,29 @@ contains
   end function motion_work
 
   !> Nominal strain at time t: relative approach of the platens over the extent of the body
-  !> between them, compression positive.
-  pure real(wp) function nominal_strain(platens, boundaries, t) result(strain)
+  !> between them, compression positive. Without displacements all motion must be prescribed.
+  pure real(wp) function nominal_strain(platens, boundaries, t, u) result(strain)
     type(platens_t),  intent(in) :: platens
     type(boundary_t), intent(in) :: boundaries(:)
     real(wp),         intent(in) :: t            !! [s]
+    real(wp),         intent(in), optional :: u(:, :)   !! at time t (n,2) [m]
 
-    strain = (boundaries(platens%first)%tables(platens%axis)%integral(t) &
-      - boundaries(platens%second)%tables(platens%axis)%integral(t)) / platens%length
+    strain = (displacement(boundaries(platens%first)) &
+      - displacement(boundaries(platens%second))) / platens%length
+
+  contains
+
+    !> Displacement of a platen along the axis: by its tables, or that of its points.
+    pure real(wp) function displacement(boundary)
+      type(boundary_t), intent(in) :: boundary
+
+      if (boundary%held(platens%axis) .and. present(u)) then
+        displacement = u(boundary%points(1), platens%axis)
+      else
+        displacement = boundary%tables(platens%axis)%integral(t)
+      end if
+    end function displacement
+
   end function nominal_strain
 
   !> The first time at which the nominal strain reaches a value; -1 where it never does.

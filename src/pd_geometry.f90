@@ -8,7 +8,17 @@ module pd_geometry
   implicit none
   private
 
-  public :: body_t, lattice_t, layer_t, lattice_body, nearest_count
+  public :: body_t, lattice_t, layer_t, side_t, lattice_body, nearest_count, side_number
+
+  character(6), parameter :: side_names(4) = [character(6) :: 'bottom', 'top', 'left', 'right']
+
+  !> The points of a body on one of its four sides, layers that continue it included, and the part
+  !> of the side that each owns: half a spacing to either side with the layout nodes, less at an
+  !> end, the width of its cell with the layout cells.
+  type :: side_t
+    integer,  allocatable :: points(:)
+    real(wp), allocatable :: from(:), to(:)     !! coordinate along the side, ascending [m]
+  end type side_t
 
   !> Reference points in the order of the rows of the lattice (y slow, x fast), or of the file.
   type :: body_t
@@ -22,6 +32,7 @@ module pd_geometry
                                                 !! no lattice
     real(wp) :: lower(2) = 0.0_wp               !! corners of the extent of the body without
     real(wp) :: upper(2) = 0.0_wp               !! fictitious points, as used [m]
+    type(side_t) :: sides(4)                    !! by `side_number`; not for a cloud
   end type body_t
 
   !> How rectangles become points.
@@ -44,6 +55,7 @@ module pd_geometry
   type :: places_t
     integer, allocatable :: owner(:, :)         !! void, or as body_t%boundary
     logical, allocatable :: filled(:, :)        !! the square up and right of a node is material
+    integer, allocatable :: number(:, :)        !! of the point at a place, 0: none
   end type places_t
 
   integer, parameter :: void = -1
@@ -94,6 +106,7 @@ contains
       end if
     end do
     call number_points(places, origin, lattice, body)
+    call find_sides(places, origin, counts, lattice, body)
   end subroutine lattice_body
 
   !> Mark the points and the squares of the rectangles.
@@ -200,7 +213,7 @@ contains
   !> Number the places row by row and give them positions and volumes: the occupied ones, or with
   !> voids all of the box and a margin, so that a shift by a horizon never leaves the fields.
   subroutine number_points(places, origin, lattice, body)
-    type(places_t),  intent(in)    :: places
+    type(places_t),  intent(inout) :: places
     real(wp),        intent(in)    :: origin(2)
     type(lattice_t), intent(in)    :: lattice
     type(body_t),    intent(inout) :: body
@@ -216,6 +229,8 @@ contains
     end if
     allocate (body%position(body%n, 2), body%volume(body%n), source=0.0_wp)
     allocate (body%boundary(body%n), source=void)
+    allocate (places%number, mold=places%owner)
+    places%number = 0
     offset = merge(0.5_wp, 0.0_wp, lattice%cells)
     k = 0
     do iy = low(2), high(2)
@@ -226,6 +241,7 @@ contains
         if (lattice%with_voids) i = lattice%rows + 1 + ix - low(1) &
           + body%stride * (iy - low(2) + lattice%rows)
         body%points(k) = i
+        places%number(ix, iy) = i
         body%position(i, :) = origin + (real([ix, iy], wp) + offset) * lattice%spacing
         body%boundary(i) = places%owner(ix, iy)
         quarters = 4
@@ -235,6 +251,64 @@ contains
       end do
     end do
   end subroutine number_points
+
+  !> Index of a side in `body_t%sides`, 0 where there is none of that name.
+  pure integer function side_number(side) result(k)
+    character(*), intent(in) :: side
+
+    do k = size(side_names), 1, -1
+      if (side_names(k) == side) return
+    end do
+  end function side_number
+
+  !> Points on the outermost line of the body at each side. Parts of the body that are set back from
+  !> that line do not belong to the side.
+  subroutine find_sides(places, origin, counts, lattice, body)
+    type(places_t),  intent(in)    :: places
+    real(wp),        intent(in)    :: origin(2)
+    integer,         intent(in)    :: counts(2)
+    type(lattice_t), intent(in)    :: lattice
+    type(body_t),    intent(inout) :: body
+    integer :: line(4), squares(4), k
+
+    squares = [0, counts(2) - 1, 0, counts(1) - 1]
+    line = squares
+    if (.not. lattice%cells) line([2, 4]) = squares([2, 4]) + 1
+    do k = 1, 2
+      call find_side(lbound(places%number, 1), places%number(:, line(k)), &
+        places%filled(:, squares(k)), origin(1), lattice, body%sides(k))
+    end do
+    do k = 3, 4
+      call find_side(lbound(places%number, 2), places%number(line(k), :), &
+        places%filled(squares(k), :), origin(2), lattice, body%sides(k))
+    end do
+  end subroutine find_sides
+
+  !> The points of one line of places, and what each owns of the squares along it.
+  pure subroutine find_side(first, number, filled, origin, lattice, side)
+    integer,         intent(in)  :: first             !! index of the first place
+    integer,         intent(in)  :: number(first:)
+    logical,         intent(in)  :: filled(first:)
+    real(wp),        intent(in)  :: origin            !! coordinate of place 0 [m]
+    type(lattice_t), intent(in)  :: lattice
+    type(side_t),    intent(out) :: side
+    real(wp) :: ends(2)
+    integer  :: i, k
+
+    allocate (side%points(count(number > 0)))
+    allocate (side%from(size(side%points)), side%to(size(side%points)))
+    k = 0
+    do i = first, ubound(number, 1)
+      if (number(i) == 0) cycle
+      k = k + 1
+      ends = [0.0_wp, 1.0_wp]
+      if (.not. lattice%cells) &
+        ends = merge([-0.5_wp, 0.5_wp], [0.0_wp, 0.0_wp], filled(i - 1:i))
+      side%points(k) = number(i)
+      side%from(k) = origin + (real(i, wp) + ends(1)) * lattice%spacing
+      side%to(k) = origin + (real(i, wp) + ends(2)) * lattice%spacing
+    end do
+  end subroutine find_side
 
   !> Lowest and highest column and row that hold a point.
   pure subroutine occupied_box(places, low, high)

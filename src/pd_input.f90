@@ -2,10 +2,11 @@
 module pd_input
   use pd_errors, only: error_list_t
   use pd_input_checks, only: check_model, resolved_path
-  use pd_input_types, only: boundary_input_t, input_t
+  use pd_input_types, only: boundary_input_t, input_t, pressure_input_t
   use pd_input_values, only: check_groups, count_groups, group_named, is_given, take_integer, &
     take_list, take_real, take_text, take_vector
   use pd_kinds, only: wp
+  use pd_load_checks, only: check_loads
   use pd_motion_checks, only: check_motion
   use pd_namelist, only: namelist_group_t, read_text_file, scan_namelist
   use pd_platens, only: platens_of
@@ -42,6 +43,7 @@ contains
     call fill(groups, input)
     call check_model(input, groups, errors)
     call check_motion(input, groups, errors)
+    call check_loads(input, groups, errors)
   end subroutine read_input
 
   !> All values of the file and the defaults of the rest.
@@ -62,6 +64,10 @@ contains
       call fill_boundary(group_named(groups, 'boundary', k, input%path), input%boundaries(k))
     end do
     input%platens = platens_of(input%boundaries)
+    allocate (input%pressures(count_groups(groups, 'pressure')))
+    do k = 1, size(input%pressures)
+      call fill_pressure(group_named(groups, 'pressure', k, input%path), input%pressures(k))
+    end do
     call fill_stabilisation(group_named(groups, 'stabilisation', 1, input%path), input)
     call fill_integration(group_named(groups, 'integration', 1, input%path), input)
     call fill_imperfection(group_named(groups, 'imperfection', 1, input%path), input)
@@ -134,7 +140,20 @@ contains
     call take_list(group, 'velocities_y', boundary%velocities_y)
     call take_vector(group, 'velocity_gradient', boundary%velocity_gradient)
     call take_list(group, 'factors', boundary%factors)
+    call take_list(group, 'traction', boundary%traction)
+    call take_real(group, 'ramp_time', boundary%ramp_time)
   end subroutine fill_boundary
+
+  subroutine fill_pressure(group, pressure)
+    type(namelist_group_t), intent(in)    :: group
+    type(pressure_input_t), intent(inout) :: pressure
+
+    call take_text(group, 'name', pressure%name)
+    call take_text(group, 'side', pressure%side)
+    call take_list(group, 'span', pressure%span)
+    call take_real(group, 'value', pressure%value)
+    call take_real(group, 'ramp_time', pressure%ramp_time)
+  end subroutine fill_pressure
 
   subroutine fill_stabilisation(group, input)
     type(namelist_group_t), intent(in)    :: group

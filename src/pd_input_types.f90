@@ -9,7 +9,7 @@ module pd_input_types
 
   public :: input_t, run_input_t, discretisation_input_t, body_input_t, material_input_t
   public :: boundary_input_t, stabilisation_input_t, integration_input_t, imperfection_input_t
-  public :: random_field_input_t, output_input_t
+  public :: random_field_input_t, output_input_t, pressure_input_t
 
   type :: run_input_t
     character(:), allocatable :: title, name, output_dir
@@ -45,7 +45,16 @@ module pd_input_types
     real(wp), allocatable :: velocities_x(:), velocities_y(:)   !! [m/s]; size 0: zero
     real(wp) :: velocity_gradient(4) = 0.0_wp          !! xx, xy, yx, yy [1/s]
     real(wp), allocatable :: factors(:)                !! size 0: 1 at all times
+    real(wp), allocatable :: traction(:)               !! x, y [Pa]; size 0: motion prescribed
+    real(wp) :: ramp_time = 0.0_wp                     !! of the traction [s]
   end type boundary_input_t
+
+  type :: pressure_input_t
+    character(:), allocatable :: name, side
+    real(wp), allocatable :: span(:)                   !! from, to [m]; size 0: the whole side
+    real(wp) :: value = unset                          !! [Pa]
+    real(wp) :: ramp_time = 0.0_wp                     !! [s]
+  end type pressure_input_t
 
   type :: stabilisation_input_t
     character(:), allocatable :: method
@@ -89,6 +98,7 @@ module pd_input_types
     type(body_input_t),     allocatable :: bodies(:)
     type(material_input_t)       :: material
     type(boundary_input_t), allocatable :: boundaries(:)
+    type(pressure_input_t), allocatable :: pressures(:)
     type(stabilisation_input_t)  :: stabilisation
     type(integration_input_t)    :: integration
     type(imperfection_input_t)   :: imperfection

@@ -58,20 +58,22 @@ contains
   pure function group_table() result(groups)
     type(group_key_t), allocatable :: groups(:)
 
-    allocate (groups(10))
+    allocate (groups(11))
     groups(1) = group_key_t('run', required=.true., meaning='names of the run and of its files')
     groups(2) = group_key_t('discretisation', required=.true., &
                             meaning='points, horizon and weights')
     groups(3) = group_key_t('body', required=.true., repeats=.true., &
                             meaning='where there is material')
     groups(4) = group_key_t('material', required=.true., meaning='the constitutive law')
-    groups(5) = group_key_t('boundary', repeats=.true., meaning='points of prescribed motion')
-    groups(6) = group_key_t('stabilisation', meaning='control of zero-energy modes')
-    groups(7) = group_key_t('integration', required=.true., &
+    groups(5) = group_key_t('boundary', repeats=.true., &
+                            meaning='points of prescribed motion, and platens under a load')
+    groups(6) = group_key_t('pressure', repeats=.true., meaning='a load on a side without boundary')
+    groups(7) = group_key_t('stabilisation', meaning='control of zero-energy modes')
+    groups(8) = group_key_t('integration', required=.true., &
                             meaning='end of the run, time step and damping')
-    groups(8) = group_key_t('imperfection', meaning='a weak patch that seeds a shear band')
-    groups(9) = group_key_t('random_field', meaning='a yield stress that varies')
-    groups(10) = group_key_t('output', meaning='what is written and when')
+    groups(9) = group_key_t('imperfection', meaning='a weak patch that seeds a shear band')
+    groups(10) = group_key_t('random_field', meaning='a yield stress that varies')
+    groups(11) = group_key_t('output', meaning='what is written and when')
   end function group_table
 
   !> All keys, group by group.
@@ -80,13 +82,14 @@ contains
     type(key_t), allocatable :: list(:)
     integer :: n
 
-    allocate (list(64))
+    allocate (list(96))
     n = 0
     call declare_run(list, n)
     call declare_discretisation(list, n)
     call declare_body(list, n)
     call declare_material(list, n)
     call declare_boundary(list, n)
+    call declare_loads(list, n)
     call declare_integration(list, n)
     call declare_imperfection(list, n)
     call declare_random_field(list, n)
@@ -218,7 +221,7 @@ contains
       meaning='rough: both components of the motion prescribed; smooth: only the one across ' &
       //'the side; affine: the motion of a homogeneous deformation'))
     call declare(list, n, key_t(group, 'velocity', count=2, unit='m/s', default='0.0, 0.0', &
-      also='smooth: 0 along the side; not with times or affine', &
+      also='smooth: 0 along the side; not with times, traction or affine', &
       meaning='constant velocity, x and y'))
     call declare(list, n, key_t(group, 'times', count=any_count, unit='s', stands_for='none', &
       range=not_negative, also='increasing', meaning='times of the tables below'))
@@ -235,6 +238,32 @@ contains
       stands_for='1 at all times', also='as many as times; only with affine', &
       meaning='factors on velocity_gradient at these times'))
   end subroutine declare_boundary
+
+  pure subroutine declare_loads(list, n)
+    type(key_t), intent(inout) :: list(:)
+    integer,     intent(inout) :: n
+    character(*), parameter :: group = 'pressure'
+    character(*), parameter :: ramp = 'time in which it rises linearly from 0; 0: whole at once'
+
+    call declare(list, n, key_t('boundary', 'traction', count=2, unit='Pa', stands_for='none', &
+      also='in place of a motion; smooth: 0 along the side; rectangles only, not affine, not all', &
+      meaning='force per area that acts on the platen from outside, x and y: the platen moves ' &
+      //'under it and stays plane'))
+    call declare(list, n, key_t('boundary', 'ramp_time', unit='s', default='0.0', &
+      range=not_negative, also='only with traction', meaning=ramp))
+    call declare(list, n, key_t(group, 'name', kind_text, required=.true., is_name=.true., &
+      also='each name once', meaning='name in the log and in the values of the results'))
+    call declare(list, n, key_t(group, 'side', kind_text, required=.true., &
+      choices='bottom top left right', also='a side without a boundary; not for a cloud', &
+      meaning='side of the body that the pressure acts on'))
+    call declare(list, n, key_t(group, 'span', count=2, unit='m', stands_for='the whole side', &
+      also='increasing, within the side', &
+      meaning='part of the side: from, to, in the coordinate along it'))
+    call declare(list, n, key_t(group, 'value', unit='Pa', required=.true., &
+      meaning='the pressure; positive: it pushes on the body'))
+    call declare(list, n, key_t(group, 'ramp_time', unit='s', default='0.0', &
+      range=not_negative, meaning=ramp))
+  end subroutine declare_loads
 
   pure subroutine declare_integration(list, n)
     type(key_t), intent(inout) :: list(:)

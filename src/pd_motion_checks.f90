@@ -9,12 +9,13 @@ module pd_motion_checks
   use pd_input_values, only: group_named, is_damaged, is_given
   use pd_kinds, only: is_set, unset, wp
   use pd_namelist, only: max_problems, namelist_group_t, place_of
-  use pd_platens, only: approach_t, final_rate, largest_approach, platen_approach, platen_extent
+  use pd_platens, only: approach_t, final_rate, largest_approach, platen_approach, platen_extent, &
+    platen_under_load
   use pd_text, only: integer_text, number_text
   implicit none
   private
 
-  public :: check_motion
+  public :: check_motion, check_increasing
 
   character(*), parameter :: needs_platens = 'two boundaries alone, on opposite sides, not affine'
 
@@ -256,7 +257,7 @@ contains
       if (input%integration%damping_frame == 'platens') call refuse(integration, 'damping_frame')
       return
     end if
-    if (tables_disagree(input)) return
+    if (approach_unknown(input)) return
     approach = platen_approach(input)
     extent = platen_extent(input)
     if (is_set(input%integration%final_strain)) &
@@ -302,22 +303,22 @@ contains
 
   end subroutine check_platens
 
-  !> Whether a table of a platen has another length than its times, which has been complained
-  !> about: then there is no motion to look at.
-  pure logical function tables_disagree(input) result(disagree)
+  !> Whether there is no motion of the platens to look at: one of them moves under a load, or has a
+  !> table of another length than its times, which has been complained about.
+  pure logical function approach_unknown(input) result(unknown)
     type(input_t), intent(in) :: input
     integer :: i
 
-    disagree = .false.
+    unknown = platen_under_load(input)
     do i = 1, 2
       associate (b => input%boundaries(input%platens(i)))
         if (size(b%velocities_x) > 0) &
-          disagree = disagree .or. size(b%velocities_x) /= size(b%times)
+          unknown = unknown .or. size(b%velocities_x) /= size(b%times)
         if (size(b%velocities_y) > 0) &
-          disagree = disagree .or. size(b%velocities_y) /= size(b%times)
+          unknown = unknown .or. size(b%velocities_y) /= size(b%times)
       end associate
     end do
-  end function tables_disagree
+  end function approach_unknown
 
   !> Which frames are asked for, and whether they lie within the run.
   subroutine check_frames(input, groups, errors)
@@ -379,7 +380,7 @@ contains
       end if
       last = merge(t%final_strain, t%end_time, as_strain)
       if (is_set(last) .or. input%platens(1) == 0) return
-      if (tables_disagree(input)) return
+      if (approach_unknown(input)) return
       extent = platen_extent(input)
       if (.not. is_set(extent)) return
       approach = platen_approach(input)

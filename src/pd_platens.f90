@@ -6,6 +6,7 @@ module pd_platens
   private
 
   public :: approach_t, platens_of, platen_approach, platen_extent, final_rate, largest_approach
+  public :: platen_under_load
 
   !> Rate at which the platens approach each other: linear between the times, constant beyond.
   type :: approach_t
@@ -30,6 +31,18 @@ contains
         platens = [i, 3 - i]
     end do
   end function platens_of
+
+  !> Whether there are platens, and one of them moves under a load: how, only the run will tell.
+  pure logical function platen_under_load(input) result(found)
+    type(input_t), intent(in) :: input
+    integer :: i
+
+    found = .false.
+    if (input%platens(1) == 0) return
+    do i = 1, 2
+      found = found .or. size(input%boundaries(input%platens(i))%traction) > 0
+    end do
+  end function platen_under_load
 
   !> How the platens of the input approach each other. Needs platens, and tables as long as times.
   pure function platen_approach(input) result(approach)

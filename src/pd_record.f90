@@ -156,8 +156,9 @@ contains
   end subroutine observe_state
 
   !> Write a row of the history with what was seen of the state.
-  subroutine record_row(model, step, record, errors)
+  subroutine record_row(model, state, step, record, errors)
     type(model_t),      intent(in)    :: model
+    type(state_t),      intent(in)    :: state
     integer,            intent(in)    :: step
     type(record_t),     intent(inout) :: record
     type(error_list_t), intent(inout) :: errors
@@ -166,7 +167,7 @@ contains
 
     row%step = step
     row%time = real(step, wp) * model%motion%time_step
-    row%strain = strain_at(model, row%time)
+    row%strain = strain_at(model, state, row%time)
     allocate (row%force(size(model%boundaries), 2))
     do k = 1, size(model%boundaries)
       row%force(k, :) = model%boundaries(k)%force
@@ -188,12 +189,14 @@ contains
   end subroutine record_row
 
   !> Nominal strain, 0 where there are no platens.
-  pure real(wp) function strain_at(model, time) result(strain)
+  pure real(wp) function strain_at(model, state, time) result(strain)
     type(model_t), intent(in) :: model
+    type(state_t), intent(in) :: state
     real(wp),      intent(in) :: time   !! [s]
 
     strain = 0.0_wp
-    if (model%platens%axis > 0) strain = nominal_strain(model%platens, model%boundaries, time)
+    if (model%platens%axis > 0) strain = nominal_strain(model%platens, model%boundaries, time, &
+      state%displacement)
   end function strain_at
 
   !> Write the next frame.
@@ -208,8 +211,8 @@ contains
 
     time = real(step, wp) * model%motion%time_step
     call gather_fields(model, state, fields)
-    call write_frame(record%result, record%frames, step, time, strain_at(model, time), fields, &
-      errors)
+    call write_frame(record%result, record%frames, step, time, strain_at(model, state, time), &
+      fields, errors)
     record%frames = record%frames + 1
   end subroutine record_frame
 
@@ -225,7 +228,8 @@ contains
 
     time = real(step, wp) * model%motion%time_step
     call gather_fields(model, state, fields)
-    call write_failed_frame(record%result, step, time, strain_at(model, time), fields, errors)
+    call write_failed_frame(record%result, step, time, strain_at(model, state, time), fields, &
+      errors)
   end subroutine record_failure
 
   !> The fields of a frame.
@@ -252,8 +256,9 @@ contains
   end subroutine gather_fields
 
   !> Show where the run stands; axial stress and largest alpha are those of the last row.
-  subroutine record_progress(model, schedule, step, record, errors)
+  subroutine record_progress(model, state, schedule, step, record, errors)
     type(model_t),      intent(in)    :: model
+    type(state_t),      intent(in)    :: state
     type(schedule_t),   intent(in)    :: schedule
     integer,            intent(in)    :: step
     type(record_t),     intent(inout) :: record
@@ -266,7 +271,7 @@ contains
     status%largest_alpha = record%seen%max_plastic_strain
     if (model%platens%axis > 0) then
       status%has_strain = .true.
-      status%strain = strain_at(model, status%time)
+      status%strain = strain_at(model, state, status%time)
       status%axial_stress = &
         model%boundaries(model%platens%first)%force(model%platens%axis) / model%platens%width
     end if

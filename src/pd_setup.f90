@@ -3,22 +3,24 @@
 !> The only module that knows both the input and the physics.
 module pd_setup
   use pd_bond_list, only: bond_list_t, new_bond_list
-  use pd_boundary, only: boundary_t, mark_free, move, new_affine_boundary, new_rigid_boundary, &
-    platens_t, reference_ends, table_t, time_of_strain
+  use pd_boundary, only: boundary_t, control_by_force, mark_free, move, new_affine_boundary, &
+    new_ramp, new_rigid_boundary, platens_t, reference_ends, table_t, time_of_strain
   use pd_cloud, only: read_cloud
   use pd_errors, only: error_list_t
   use pd_families, only: horizon_t, new_horizon
   use pd_force, only: control_stiffness, solid_t
-  use pd_geometry, only: body_t, lattice_body, lattice_t, layer_t, nearest_count
+  use pd_geometry, only: body_t, lattice_body, lattice_t, layer_t, nearest_count, side_number
   use pd_input, only: resolved_path
   use pd_input_types, only: boundary_input_t, input_t
   use pd_j2, only: new_j2
   use pd_kinds, only: is_set, wp
   use pd_kinematics, only: inverse_shape_tensor
   use pd_lattice, only: lattice_operators_t, new_lattice_operators
+  use pd_loads, only: apply_loads
   use pd_operators, only: operators_t
   use pd_random_field, only: lognormal, longest_way, new_random_field, &
     standard_normal
+  use pd_pressure, only: pressure_t, spread_pressure, surface_vectors
   use pd_schedule, only: new_schedule, schedule_t
   use pd_stability, only: highest_frequency, wave_speed
   use pd_state, only: state_t
@@ -38,6 +40,7 @@ module pd_setup
     type(motion_t)    :: motion
     type(platens_t)   :: platens
     type(boundary_t), allocatable :: boundaries(:)
+    type(pressure_t), allocatable :: pressures(:)
     real(wp), allocatable :: free(:, :)      !! 1: free, 0: prescribed component (n,2)
     real(wp) :: spacing = 0.0_wp             !! dx [m]
     real(wp) :: delta = 0.0_wp               !! horizon [m]
@@ -148,7 +151,8 @@ contains
 
   !> Operators, material, boundaries, motion.
   !>
-  !> Errors: points that coincide, families that are too small, no free point.
+  !> Errors: points that coincide, families that are too small, no free point, a pressure that acts
+  !> on none.
   subroutine set_up_model(input, model, errors)
     type(input_t),      intent(in)    :: input
     type(model_t),      intent(inout) :: model    !! in: with its body
@@ -166,6 +170,7 @@ contains
     if (errors%count() > 0) return
     call set_up_solid(input, model)
     call set_up_boundaries(input, model)
+    call set_up_pressures(input, model, errors)
     if (.not. any(model%free > 0.0_wp)) call errors%add('no point is free to move')
   end subroutine set_up_model
 
@@ -269,6 +274,33 @@ contains
     model%damped_in_frame = input%integration%damping_frame == 'platens'
   end subroutine set_up_boundaries
 
+  !> Pressures on sides of the body.
+  subroutine set_up_pressures(input, model, errors)
+    type(input_t),      intent(in)    :: input
+    type(model_t),      intent(inout) :: model
+    type(error_list_t), intent(inout) :: errors
+    real(wp), allocatable :: vectors(:, :)
+    integer :: depth, k
+
+    allocate (model%pressures(size(input%pressures)))
+    if (size(input%pressures) == 0) return
+    allocate (vectors(model%body%n, 2))
+    call surface_vectors(model%operators, model%body%volume, model%solid%k_inverse, vectors)
+    depth = 2 * ceiling(model%delta / model%spacing)   ! where families touch cut families
+    do k = 1, size(input%pressures)
+      associate (given => input%pressures(k), pressure => model%pressures(k))
+        pressure%name = given%name
+        pressure%side = given%side
+        pressure%value = given%value
+        if (size(given%span) > 0) pressure%span = given%span
+        pressure%factor = new_ramp(given%ramp_time)
+        call spread_pressure(model%body, model%boundaries, vectors, model%spacing, depth, pressure)
+        if (size(pressure%points) == 0) &
+          call errors%add('a pressure acts on no point', '&pressure name = '//given%name)
+      end associate
+    end do
+  end subroutine set_up_pressures
+
   !> Boundary k of the body.
   type(boundary_t) function new_boundary(given, k, body) result(boundary)
     type(boundary_input_t), intent(in) :: given
@@ -294,6 +326,11 @@ contains
     tables(1) = new_table(given%times, given%velocities_x, given%velocity(1))
     tables(2) = new_table(given%times, given%velocities_y, given%velocity(2))
     boundary = new_rigid_boundary(given%name, points, prescribed, tables(1), tables(2))
+    if (size(given%traction) == 0) return
+    associate (side => body%sides(side_number(given%side)))   ! layers that continue it included
+      call control_by_force(given%traction * sum(side%to - side%from), &
+        new_ramp(given%ramp_time), boundary)
+    end associate
   end function new_boundary
 
   !> Table from the input; without one, a constant.
@@ -396,7 +433,8 @@ contains
       call reference_ends(model%platens, model%boundaries, t, frame%lower, frame%upper)
   end function damping_frame
 
-  !> State at t = 0: unloaded, moving with the frame of the damping, boundaries with theirs.
+  !> State at t = 0: undeformed, moving with the frame of the damping, boundaries with theirs; loads
+  !> without a ramp act already.
   subroutine start(model, state)
     type(model_t), intent(in)  :: model
     type(state_t), intent(out) :: state
@@ -413,6 +451,7 @@ contains
       where (model%body%boundary < 0) state%velocity(:, k) = 0.0_wp
     end do
     call move(model%boundaries, model%body%position, 0.0_wp, state%displacement, state%velocity)
+    call apply_loads(model%pressures, model%boundaries, model%body%volume, 0.0_wp, state%force)
   end subroutine start
 
 end module pd_setup

@@ -8,6 +8,7 @@ module pd_step
   use pd_force, only: force_state
   use pd_kinds, only: wp
   use pd_kinematics, only: deformation_gradient
+  use pd_loads, only: apply_loads, load_work
   use pd_observe, only: ledger_t
   use pd_setup, only: damping_frame, model_t
   use pd_state, only: state_t
@@ -32,7 +33,7 @@ module pd_step
 
 contains
 
-  !> One step of velocity Verlet, to step number `step`.
+  !> One step of velocity Verlet, to step number `step`: the loads join f, and work on v^{n+1/2}.
   !>
   !> `failed_point`: 0, or the first point whose det F is not positive (NaN included).
   subroutine take_step(step, model, state, a, ledger, timing, failed_point)
@@ -44,7 +45,7 @@ contains
     type(timing_t), intent(inout) :: timing
     integer,        intent(out)   :: failed_point
     type(boundary_t), allocatable :: before(:)
-    real(wp) :: t, t_next, first_work(2), second_work(2), dissipated
+    real(wp) :: t, t_next, first_work(2), second_work(2), dissipated, loads_work
 
     t = real(step - 1, wp) * model%motion%time_step
     t_next = real(step, wp) * model%motion%time_step
@@ -56,6 +57,7 @@ contains
         first_work)
       call timing%lap(1)
       call move(model%boundaries, x, t_next, u, v)
+      loads_work = load_work(model%pressures, model%boundaries, v, t, t_next)
       call timing%lap(6)
       call model%operators%gradient(u, f_grad)
       call timing%lap(2)
@@ -67,16 +69,18 @@ contains
       if (allocated(model%solid%control)) &
         call model%operators%add_control(model%solid%control, u, f)
       call timing%lap(5)
+      call apply_loads(model%pressures, model%boundaries, volume, t_next, f)
+      call timing%lap(6)
       call kick(model%motion, damping_frame(model, t_next), x, volume, free, f, v, second_work)
       call timing%lap(1)
 
       allocate (before(size(model%boundaries)), source=model%boundaries)
-      call boundary_forces(x, volume, f, model%boundaries)
+      call boundary_forces(x, volume, t_next, f, model%boundaries)
     end associate
     ledger%plastic_dissipation = ledger%plastic_dissipation + dissipated
     ledger%damping_dissipation = ledger%damping_dissipation + first_work(1) + second_work(1)
     ledger%external_work = ledger%external_work + first_work(2) + second_work(2) &
-      + motion_work(before, model%boundaries, t, t_next)
+      + motion_work(before, model%boundaries, t, t_next) + loads_work
     ledger%largest_work = max(ledger%largest_work, abs(ledger%external_work))
     call timing%lap(6)
   end subroutine take_step

@@ -78,6 +78,7 @@ contains
         model%boundaries(model%platens%first)%name//' and '// &
         model%boundaries(model%platens%second)%name//', '//number(model%platens%length)// &
         ' m apart')
+      call add_loads(input, model, summary)
       call summary%add('frames', whole(size(schedule%frame_steps))// &
         ' and the unloaded state; history rows '//whole(schedule%rows))
       call summary%add('memory', number(memory(model) / 1.0e6_wp)//' MB')
@@ -109,6 +110,46 @@ contains
     if (weaker > 0) call summary%add('no softening', 'at '//whole(weaker)//' points, which are '// &
       'weaker than residual_strength')
   end subroutine add_field
+
+  !> Platens that move under a load, and pressures.
+  subroutine add_loads(input, model, summary)
+    type(input_t),   intent(in)    :: input
+    type(model_t),   intent(in)    :: model
+    type(summary_t), intent(inout) :: summary
+    character(*), parameter :: per_length = ' N/m in all'
+    character(:), allocatable :: on
+    integer :: k
+
+    do k = 1, size(input%boundaries)
+      associate (given => input%boundaries(k), boundary => model%boundaries(k))
+        if (.not. any(boundary%held)) cycle
+        call summary%add('traction', number(given%traction(1))//', '// &
+          number(given%traction(2))//' Pa on '//given%name//': '//number(boundary%applied(1))// &
+          ', '//number(boundary%applied(2))//per_length//whole_from(given%ramp_time))
+      end associate
+    end do
+    do k = 1, size(input%pressures)
+      associate (given => input%pressures(k), pressure => model%pressures(k))
+        on = ' m of the body'
+        if (any(model%body%boundary(pressure%points) > 0)) on = on//' and layers that continue it'
+        call summary%add('pressure', given%name//': '//number(given%value)//' Pa on '// &
+          given%side//', '//number(pressure%length)//on//', '// &
+          whole(size(pressure%points))//' points: '//number(abs(sum(pressure%force)))// &
+          per_length//whole_from(given%ramp_time))
+      end associate
+    end do
+
+  contains
+
+    function whole_from(ramp_time) result(text)
+      real(wp), intent(in) :: ramp_time   !! [s]
+      character(:), allocatable :: text
+
+      text = ''
+      if (ramp_time > 0.0_wp) text = ', whole from '//number(ramp_time)//' s'
+    end function whole_from
+
+  end subroutine add_loads
 
   !> Memory of a run [bytes]: bonds, fields of the state (23 numbers a point), what is fixed (12),
   !> work space (4), a frame on its way to the disk (29).
@@ -152,7 +193,7 @@ contains
 
     if (abs(x) >= 1.0e7_wp .or. (abs(x) < 1.0e-3_wp .and. abs(x) > 0.0_wp)) then
       write (buffer, '(es12.4)') x
-    else if (abs(x - anint(x)) < 1.0e-9_wp * abs(x)) then
+    else if (abs(x - anint(x)) <= 1.0e-9_wp * abs(x)) then
       write (buffer, '(i0)') nint(x)
     else
       decimals = max(0, 4 - floor(log10(abs(x))))

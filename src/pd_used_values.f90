@@ -2,7 +2,7 @@
 !> what differs from the run that a checkpoint belongs to.
 module pd_used_values
   use pd_errors, only: error_list_t
-  use pd_input_types, only: boundary_input_t, input_t
+  use pd_input_types, only: boundary_input_t, input_t, pressure_input_t
   use pd_kinds, only: wp
   use pd_text, only: integer_text, number_text, read_number, shortened
   implicit none
@@ -32,7 +32,7 @@ contains
 
   !> All values as used, defaults included, in the order of the reference; numbers with as many
   !> digits as read back to the same bits, 'none' where there is no value. Bodies carry their
-  !> number, boundaries their name: body(1).x_min, boundary(top).velocity.
+  !> number, boundaries and pressures their name: body(1).x_min, boundary(top).velocity.
   function used_values(input) result(values)
     type(input_t), intent(in) :: input
     character(:), allocatable :: values(:)
@@ -42,6 +42,9 @@ contains
     call add_run(input, lines)
     do i = 1, size(input%boundaries)
       call add_boundary(input%boundaries(i), lines)
+    end do
+    do i = 1, size(input%pressures)
+      call add_pressure(input%pressures(i), lines)
     end do
     call add_rest(input, lines)
     longest = 1
@@ -108,7 +111,21 @@ contains
     call lines%add_reals(stem//'velocities_y', boundary%velocities_y)
     call lines%add_reals(stem//'velocity_gradient', boundary%velocity_gradient)
     call lines%add_reals(stem//'factors', boundary%factors)
+    call lines%add_reals(stem//'traction', boundary%traction)
+    call lines%add_real(stem//'ramp_time', boundary%ramp_time)
   end subroutine add_boundary
+
+  subroutine add_pressure(pressure, lines)
+    type(pressure_input_t), intent(in)    :: pressure
+    type(lines_t),          intent(inout) :: lines
+    character(:), allocatable :: stem
+
+    stem = 'pressure('//pressure%name//').'
+    call lines%add_text(stem//'side', pressure%side)
+    call lines%add_reals(stem//'span', pressure%span)
+    call lines%add_real(stem//'value', pressure%value)
+    call lines%add_real(stem//'ramp_time', pressure%ramp_time)
+  end subroutine add_pressure
 
   subroutine add_rest(input, lines)
     type(input_t), intent(in)    :: input

@@ -122,7 +122,8 @@ contains
     allocate (a(model%body%n, 4))
     if (checkpoint%history_rows > 0) then
       state = state%scattered(model%body%points, model%body%n)
-      call boundary_forces(model%body%position, model%body%volume, state%force, model%boundaries)
+      call boundary_forces(model%body%position, model%body%volume, checkpoint%time, &
+        state%force, model%boundaries)
     else
       call start(model, state)
       call observe(model%body, model%solid, model%operators, state, ledger, seen)
@@ -180,12 +181,12 @@ contains
     end do
     call observe_state(model, state, ledger, record)
     if (checkpoint%history_rows == 0) then
-      call record_row(model, 0, record, errors)
+      call record_row(model, state, 0, record, errors)
       if (errors%count() == 0) call record_frame(model, state, 0, record, errors)
     else
       call record_line(record, 'going on from a checkpoint', errors)
     end if
-    call record_progress(model, schedule, checkpoint%step, record, errors)
+    call record_progress(model, state, schedule, checkpoint%step, record, errors)
     call stop_if_any(errors, exit_file)
   end subroutine open_outputs
 
@@ -213,7 +214,7 @@ contains
       end if
     end if
 
-    if (row) call record_row(model, step, record, errors)
+    if (row) call record_row(model, state, step, record, errors)
     if (frame) then
       do k = 1, size(schedule%frame_steps)
         if (schedule%frame_steps(k) == step) call record_frame(model, state, step, record, errors)
@@ -224,7 +225,7 @@ contains
       call system_clock(last_checkpoint)
     end if
     if (progress_due(record%progress, step, schedule%steps)) &
-      call record_progress(model, schedule, step, record, errors)
+      call record_progress(model, state, schedule, step, record, errors)
     call stop_if_any(errors, exit_file)
   end subroutine write_what_is_due
 

@@ -79,6 +79,37 @@ MISTAKES = {
         "&random_field coefficient_of_variation = 0.2, correlation_length = 0.3 / ! ",
         "&random_field: a random field of the yield stress for a material that does not yield",
     ),
+    "pressure on a platen": (
+        "&output",
+        "&pressure name = 'p', side = 'top', value = 1.0 /\n&output",
+        "a pressure on a side with a boundary; found: 'top', where 'top' lies; allowed: a side",
+    ),
+    "pressure beyond its side": (
+        "&output",
+        "&pressure name = 'p', side = 'left', value = 1.0, span = 0.5, 1.2 /\n&output",
+        "the span goes beyond the side; found: 0.5, 1.2; allowed: within 0.0 to 1.0 [m]",
+    ),
+    "pressure without a value": (
+        "&output",
+        "&pressure name = 'p', side = 'left' /\n&output",
+        "&pressure value: the key is missing; allowed: any number [Pa]",
+    ),
+    "motion and traction": (
+        "velocity = 0.0, -0.01",
+        "velocity = 0.0, -0.01, traction = 0.0, -1.0",
+        "velocity: a motion beside a traction; found: both; allowed: a motion or a traction",
+    ),
+    "traction along a smooth side": (
+        "velocity = 0.0, -0.01",
+        "contact = 'smooth', traction = 2.0, -1.0",
+        "a smooth boundary carries no traction along its side; found: 2.0",
+    ),
+    "strain of a platen under a load": (
+        "velocity = 0.0, -0.01",
+        "traction = 0.0, -1.0",
+        "&integration final_strain: a platen moves under a traction",
+    ),
+    "ramp without a load": ("-0.01 /", "-0.01, ramp_time = 1 /", "no effect without traction"),
     "cloud that is not there": (
         "x_min = 0.0, x_max = 0.5, y_min = 0.0, y_max = 1.0",
         "shape = 'file', file = 'none.txt'",

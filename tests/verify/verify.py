@@ -431,6 +431,116 @@ def wave() -> list[Row]:
     ]
 
 
+def loads_body(spacing: float, m: int, layout: str = "nodes") -> Groups:
+    """Elastic specimen of 1 m x 2 m, at rest soon after a slow load."""
+    return [
+        *specimen(spacing, m * spacing, layout=layout, volumes="tributary"),
+        material("elastic"),
+        ("integration", {"end_time": 0.9, "damping": 2.0e5}),
+        ("output", {"history_count": 100, "frame_count": 1}),
+    ]
+
+
+def side_pressure(side: str, value: float) -> tuple[str, dict[str, object]]:
+    """A pressure on a whole side, which rises within 0.3 s."""
+    return ("pressure", {"name": side, "side": side, "value": value, "ramp_time": 0.3})
+
+
+def pressure() -> list[Row]:
+    """Dead pressure: all round, on both sides between smooth platens, on one between rough ones.
+
+    Strains are below 0.04 %, so that all stress measures agree.
+    """
+    p = 20.0e3
+    sides = ("left", "right", "bottom", "top")
+    groups = [*loads_body(0.1, 2, "cells"), *(side_pressure(side, p) for side in sides)]
+    history = run("pressure_all_round", groups).history()
+    rows = [
+        Row(
+            "pressure",
+            f"stress {axis} under pressure all round",
+            "kPa",
+            -p / 1e3,
+            float(history[f"mean_stress_{axis}"][-1]) / 1e3,
+            1.0e-4,
+            "closed form",
+        )
+        for axis in ("xx", "yy")
+    ]
+    between = [
+        ("boundary", {"name": side, "side": side, "contact": "smooth"})
+        for side in ("bottom", "top")
+    ]
+    both = [side_pressure(side, p) for side in ("left", "right")]
+    history = run("pressure_smooth", [*loads_body(0.02, 3), *between, *both]).history()
+    for quantity, column, exact in (
+        ("lateral pressure, smooth fixed platens: stress xx = -p", "xx", -p),
+        ("the same: stress yy = -nu p / (1 - nu)", "yy", -NU / (1.0 - NU) * p),
+    ):
+        computed = float(history[f"mean_stress_{column}"][-1])
+        rows.append(
+            Row("pressure", quantity, "kPa", exact / 1e3, computed / 1e3, 1.0e-2, "closed form")
+        )
+    between = [
+        ("boundary", {"name": side, "side": side, "contact": "rough"}) for side in ("bottom", "top")
+    ]
+    groups = [*loads_body(0.05, 3), *between, side_pressure("left", p)]
+    history = run("pressure_rough", groups).history()
+    force = float(history["bottom_force_x"][-1] + history["top_force_x"][-1])
+    rows.append(
+        Row(
+            "pressure",
+            "pressure on one side, rough platens: their forces = -p H",
+            "kN/m",
+            -p * 2.0 / 1e3,
+            force / 1e3,
+            1.0e-3,
+            "closed form",
+        )
+    )
+    return rows
+
+
+def traction() -> list[Row]:
+    """A platen under a dead load between free sides: stress, strain, planeness, balance."""
+    load = 20.0e3
+    top = {"name": "top", "side": "top", "contact": "smooth"}
+    groups = [
+        *loads_body(0.025, 3),
+        ("boundary", {"name": "bottom", "side": "bottom", "contact": "smooth"}),
+        ("boundary", top | {"traction": (0.0, -load), "ramp_time": 0.3}),
+    ]
+    result = run("traction", groups)
+    history = result.history()
+    platen = result.positions[:, 1] > 2.0 + 1.0e-9
+    height = np.asarray(result.last_frame["displacement_y"])[platen]
+    stress, strain = (float(history[f"mean_{name}_yy"][-1]) for name in ("stress", "strain"))
+    error = float(np.max(np.abs(history["energy_error"][5:])))
+    return [
+        Row("traction", "stress yy", "kPa", -load / 1e3, stress / 1e3, 1.0e-2, "closed form"),
+        Row(
+            "traction",
+            "strain yy = -t (1 - nu^2) / E",
+            "%",
+            -100.0 * load * (1.0 - NU**2) / E,
+            100.0 * strain,
+            1.0e-2,
+            "closed form",
+        ),
+        Row(
+            "traction",
+            "platen out of plane, over its displacement",
+            "1",
+            0.0,
+            float(np.ptp(height) / np.max(np.abs(height))),
+            1.0e-12,
+            "closed form",
+            scale=1.0,
+        ),
+        Row("traction", "largest energy_error", "1", 0.0, error, 1.0e-3, "closed form", scale=1.0),
+    ]
+
+
 def shipped(name: str) -> Run:
     """Run an input of the folder input/."""
     folder = RESULTS / name
@@ -520,6 +630,8 @@ CASES: dict[str, Callable[[], list[Row]]] = {
     "softening": softening,
     "cyclic": cyclic,
     "wave": wave,
+    "pressure": pressure,
+    "traction": traction,
     "compression": compression,
     "perfect": perfect,
 }

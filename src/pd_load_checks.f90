@@ -1,0 +1,170 @@
+!> What several keys together must fulfil: pressures, and platens that move under a load.
+!>
+!> A key that is absent or damaged holds `unset` or an empty text here; its checks are passed over,
+!> because it has been complained about already.
+module pd_load_checks
+  use pd_errors, only: error_list_t
+  use pd_input_checks, only: add_useless, is_cloud
+  use pd_input_types, only: boundary_input_t, input_t
+  use pd_input_values, only: group_named, is_given
+  use pd_kinds, only: is_set, wp
+  use pd_motion_checks, only: check_increasing
+  use pd_namelist, only: max_problems, namelist_group_t, place_of
+  use pd_platens, only: platen_under_load
+  use pd_text, only: integer_text, number_text
+  implicit none
+  private
+
+  public :: check_loads
+
+contains
+
+  !> All checks of this module.
+  subroutine check_loads(input, groups, errors)
+    type(input_t),          intent(in)    :: input
+    type(namelist_group_t), intent(in)    :: groups(:)
+    type(error_list_t),     intent(inout) :: errors
+    type(namelist_group_t) :: group
+    integer :: k
+
+    do k = 1, size(input%boundaries)
+      if (errors%count() >= max_problems) return
+      group = group_named(groups, 'boundary', k, input%path)
+      if (is_given(group, 'traction')) then
+        call check_traction(input, input%boundaries(k), group, errors)
+      else
+        call add_useless(group, 'ramp_time', 'without traction', errors)
+      end if
+    end do
+    if (platen_under_load(input)) call check_strains(input, groups, errors)
+    do k = 1, size(input%pressures)
+      if (errors%count() >= max_problems) return
+      group = group_named(groups, 'pressure', k, input%path)
+      call check_name(input, k, group, errors)
+      call check_side(input, k, group, errors)
+      call check_span(input, k, group, errors)
+    end do
+  end subroutine check_loads
+
+  !> A boundary that moves under a load.
+  subroutine check_traction(input, b, group, errors)
+    type(input_t),          intent(in)    :: input
+    type(boundary_input_t), intent(in)    :: b
+    type(namelist_group_t), intent(in)    :: group
+    type(error_list_t),     intent(inout) :: errors
+    character(*), parameter :: motions(4) = [character(12) :: 'velocity', 'times', &
+                                             'velocities_x', 'velocities_y']
+    integer :: along, i
+
+    if (is_cloud(input)) call errors%add('a traction on a boundary of a point cloud', &
+      where=place_of(group, 'traction'), found='shape = ''file''', allowed='only for rectangles')
+    if (b%contact == 'affine') call errors%add('an affine boundary under a traction', &
+      where=place_of(group, 'contact'), found='''affine''', allowed='''rough'', ''smooth''')
+    if (b%side == 'all') call errors%add('a traction on all sides', &
+      where=place_of(group, 'side'), found='''all''', &
+      allowed='''bottom'', ''top'', ''left'', ''right''')
+    do i = 1, size(motions)
+      if (.not. is_given(group, trim(motions(i)))) cycle
+      call errors%add('a motion beside a traction', where=place_of(group, trim(motions(i))), &
+        found='both', allowed='a motion or a traction')
+      exit
+    end do
+    if (b%contact /= 'smooth' .or. size(b%traction) == 0) return
+    along = 1
+    if (b%side == 'left' .or. b%side == 'right') along = 2
+    if (abs(b%traction(along)) > 0.0_wp) call errors%add( &
+      'a smooth boundary carries no traction along its side', &
+      where=place_of(group, 'traction'), found=number_text(b%traction(along)), &
+      allowed='0 as component '//integer_text(along)//', or contact = ''rough''')
+  end subroutine check_traction
+
+  !> What asks for the motion of the platens before the run.
+  subroutine check_strains(input, groups, errors)
+    type(input_t),          intent(in)    :: input
+    type(namelist_group_t), intent(in)    :: groups(:)
+    type(error_list_t),     intent(inout) :: errors
+    character(*), parameter :: unknown = 'a platen moves under a traction: when it reaches a ' &
+      //'strain is not known beforehand'
+    type(namelist_group_t) :: integration, output
+
+    integration = group_named(groups, 'integration', 1, input%path)
+    output = group_named(groups, 'output', 1, input%path)
+    if (is_given(integration, 'final_strain')) call errors%add(unknown, &
+      where=place_of(integration, 'final_strain'), allowed='end_time in its place')
+    if (is_given(output, 'frame_strains')) call errors%add(unknown, &
+      where=place_of(output, 'frame_strains'), allowed='frame_times or frame_count in its place')
+    if (input%integration%damping_frame == 'platens') call errors%add( &
+      'a platen moves under a traction: its own motion would not be damped', &
+      where=place_of(integration, 'damping_frame'), found='''platens''', allowed='''rest''')
+  end subroutine check_strains
+
+  subroutine check_name(input, k, group, errors)
+    type(input_t),          intent(in)    :: input
+    integer,                intent(in)    :: k
+    type(namelist_group_t), intent(in)    :: group
+    type(error_list_t),     intent(inout) :: errors
+    integer :: j
+
+    if (input%pressures(k)%name == '') return
+    do j = 1, k - 1
+      if (input%pressures(j)%name /= input%pressures(k)%name) cycle
+      call errors%add('two pressures have the same name', where=place_of(group, 'name'), &
+                      found=''''//input%pressures(k)%name//'''', allowed='each name once')
+      return
+    end do
+  end subroutine check_name
+
+  subroutine check_side(input, k, group, errors)
+    type(input_t),          intent(in)    :: input
+    integer,                intent(in)    :: k
+    type(namelist_group_t), intent(in)    :: group
+    type(error_list_t),     intent(inout) :: errors
+    integer :: j
+
+    if (is_cloud(input)) then
+      call errors%add('a pressure on a point cloud', where=place_of(group, 'side'), &
+                      found='shape = ''file''', allowed='only for rectangles')
+      return
+    end if
+    if (input%pressures(k)%side == '') return
+    do j = 1, size(input%boundaries)
+      associate (b => input%boundaries(j))
+        if (b%side /= input%pressures(k)%side .and. b%side /= 'all') cycle
+        call errors%add('a pressure on a side with a boundary', where=place_of(group, 'side'), &
+          found=''''//input%pressures(k)%side//''', where '''//b%name//''' lies', &
+          allowed='a side without a boundary')
+        return
+      end associate
+    end do
+  end subroutine check_side
+
+  !> The span of pressure k within its side. Extents that will be adjusted may differ by a spacing.
+  subroutine check_span(input, k, group, errors)
+    type(input_t),          intent(in)    :: input
+    integer,                intent(in)    :: k
+    type(namelist_group_t), intent(in)    :: group
+    type(error_list_t),     intent(inout) :: errors
+    real(wp) :: lower, upper, slack
+
+    associate (p => input%pressures(k), spacing => input%discretisation%spacing)
+      if (size(p%span) == 0) return
+      call check_increasing(p%span, 'span', group, errors)
+      if (p%span(2) <= p%span(1) .or. p%side == '' .or. is_cloud(input)) return
+      if (size(input%bodies) == 0 .or. .not. is_set(spacing)) return
+      if (p%side == 'bottom' .or. p%side == 'top') then
+        lower = minval(input%bodies%x_min)
+        upper = maxval(input%bodies%x_max)
+      else
+        lower = minval(input%bodies%y_min)
+        upper = maxval(input%bodies%y_max)
+      end if
+      if (.not. (is_set(lower) .and. is_set(upper))) return
+      slack = merge(1.0_wp, 1.0e-6_wp, input%discretisation%fit == 'nearest')*spacing
+      if (p%span(1) < lower - slack .or. p%span(2) > upper + slack) call errors%add( &
+        'the span goes beyond the side', where=place_of(group, 'span'), &
+        found=number_text(p%span(1))//', '//number_text(p%span(2)), &
+        allowed='within '//number_text(lower)//' to '//number_text(upper)//' [m]')
+    end associate
+  end subroutine check_span
+
+end module pd_load_checks
