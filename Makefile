@@ -6,8 +6,8 @@ modules := \
   pd_kinds pd_system pd_errors pd_text pd_files pd_input_types pd_state \
   pd_cursor pd_namelist pd_keys pd_input_reference pd_input_values pd_used_values \
   pd_platens pd_input_checks pd_motion_checks pd_load_checks pd_input \
-  pd_geometry pd_cloud pd_cells pd_families pd_operators pd_bond_list pd_lattice pd_kinematics \
-  pd_strain pd_j2 pd_force pd_random pd_random_field \
+  pd_geometry pd_cloud pd_cells pd_families pd_operators pd_bond_list pd_columns pd_lattice \
+  pd_kinematics pd_strain pd_j2 pd_timing pd_force pd_random pd_random_field \
   pd_boundary pd_pressure pd_loads pd_verlet pd_stability pd_observe pd_schedule pd_setup pd_step \
   pd_summary \
   pd_version \

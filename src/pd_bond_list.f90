@@ -7,7 +7,7 @@ module pd_bond_list
   use pd_cells, only: cells_t, largest_neighbourhood, sort_into_cells
   use pd_errors, only: error_list_t
   use pd_families, only: family, horizon_t, influence
-  use pd_kinds, only: i8, wp
+  use pd_kinds, only: i8, n_block, wp
   use pd_operators, only: operators_t
   implicit none
   private
@@ -22,9 +22,9 @@ module pd_bond_list
     real(wp),    allocatable, private :: weight(:)     !! omega V_j (bonds) [m^2]
     real(wp),    allocatable, private :: position(:, :)  !! X (n,2) [m]
   contains
-    procedure :: gradient
-    procedure :: divergence
-    procedure :: add_control
+    procedure :: gradient_block
+    procedure :: divergence_block
+    procedure :: control_block
     procedure :: shape_tensor
     procedure :: zero_energy_squared
     procedure :: bonds
@@ -49,6 +49,7 @@ contains
 
     n = size(position, 1)
     operators%n = n
+    operators%last_point = n
     allocate (operators%position(n, 2), source=position)
     call sort_into_cells(position, horizon%delta, cells)
     most = largest_neighbourhood(cells)
@@ -157,18 +158,17 @@ contains
     end if
   end subroutine report_coincident
 
-  !> G[u]: h = sum_j omega V_j (u_j - u_i) (x) xi.
-  subroutine gradient(self, u, h)
+  !> G[u] of points lo to hi: h = sum_j omega V_j (u_j - u_i) (x) xi.
+  pure subroutine gradient_block(self, lo, hi, u, h)
     class(bond_list_t), intent(in)  :: self
+    integer,  intent(in) :: lo, hi
     real(wp), intent(in),    contiguous :: u(:, :)   !! (n,2) [m]
     real(wp), intent(inout), contiguous :: h(:, :)   !! out: (n,4) xx xy yx yy [m^4]
     integer     :: i, j
     integer(i8) :: b
     real(wp)    :: dx, dy, hxx, hxy, hyx, hyy
 
-    !$omp parallel do schedule(static) default(none) shared(self, u, h) &
-    !$omp private(i, j, b, dx, dy, hxx, hxy, hyx, hyy)
-    do i = 1, self%n
+    do i = lo, hi
       hxx = 0.0_wp
       hxy = 0.0_wp
       hyx = 0.0_wp
@@ -187,20 +187,19 @@ contains
       h(i, 3) = hyx
       h(i, 4) = hyy
     end do
-    !$omp end parallel do
-  end subroutine gradient
+  end subroutine gradient_block
 
-  !> D[A]: f = sum_j omega V_j (A_i + A_j) xi.
-  subroutine divergence(self, a, f)
+  !> D[A] of points lo to hi: f = sum_j omega V_j (A_i + A_j) xi.
+  pure subroutine divergence_block(self, lo, hi, a, f)
     class(bond_list_t), intent(in)  :: self
+    integer,  intent(in) :: lo, hi
     real(wp), intent(in),    contiguous :: a(:, :)   !! (n,4) xx xy yx yy [N/m^6]
     real(wp), intent(inout), contiguous :: f(:, :)   !! out: (n,2) [N/m^3]
     integer     :: i, j
     integer(i8) :: b
     real(wp)    :: fx, fy
 
-    !$omp parallel do schedule(static) default(none) shared(self, a, f) private(i, j, b, fx, fy)
-    do i = 1, self%n
+    do i = lo, hi
       fx = 0.0_wp
       fy = 0.0_wp
       do b = self%first(i), self%first(i + 1) - 1
@@ -211,12 +210,12 @@ contains
       f(i, 1) = fx
       f(i, 2) = fy
     end do
-    !$omp end parallel do
-  end subroutine divergence
+  end subroutine divergence_block
 
-  !> f <- f + Z[u]: the bond part of the zero-energy control. Its affine part belongs to A.
-  subroutine add_control(self, c, u, f)
+  !> f <- f + Z[u] for points lo to hi: the bond part of the zero-energy control.
+  pure subroutine control_block(self, lo, hi, c, u, f)
     class(bond_list_t), intent(in)    :: self
+    integer,  intent(in) :: lo, hi
     real(wp), intent(in),    contiguous :: c(:)      !! (n) [N/m^6]
     real(wp), intent(in),    contiguous :: u(:, :)   !! (n,2) [m]
     real(wp), intent(inout), contiguous :: f(:, :)   !! (n,2) [N/m^3]
@@ -224,9 +223,7 @@ contains
     integer(i8) :: b
     real(wp)    :: fx, fy, weight
 
-    !$omp parallel do schedule(static) default(none) shared(self, c, u, f) &
-    !$omp private(i, j, b, fx, fy, weight)
-    do i = 1, self%n
+    do i = lo, hi
       fx = 0.0_wp
       fy = 0.0_wp
       do b = self%first(i), self%first(i + 1) - 1
@@ -238,18 +235,22 @@ contains
       f(i, 1) = f(i, 1) + fx
       f(i, 2) = f(i, 2) + fy
     end do
-    !$omp end parallel do
-  end subroutine add_control
+  end subroutine control_block
 
   !> K = sum_j omega V_j xi (x) xi.
   subroutine shape_tensor(self, k)
     class(bond_list_t), intent(in) :: self
     real(wp), intent(inout), contiguous :: k(:, :)   !! out: (n,3) xx yy xy [m^4]
     real(wp), allocatable :: h(:, :)
+    integer :: lo
 
     ! the gradient of X: an affine map is then exact whatever the round-off of the sums
     allocate (h(self%n, 4))
-    call self%gradient(self%position, h)
+    !$omp parallel do schedule(static) default(none) shared(self, h) private(lo)
+    do lo = 1, self%n, n_block
+      call self%gradient_block(lo, min(lo + n_block - 1, self%n), self%position, h)
+    end do
+    !$omp end parallel do
     k(:, 1) = h(:, 1)
     k(:, 2) = h(:, 4)
     k(:, 3) = h(:, 2)

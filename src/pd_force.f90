@@ -5,14 +5,15 @@
 module pd_force
   use pd_j2, only: elastic_stress_block, j2_t, stress_block
   use pd_kinds, only: n_block, pi, wp
-  use pd_kinematics, only: deformation_gradient
+  use pd_kinematics, only: deformation_gradient_block
   use pd_operators, only: operators_t
   use pd_state, only: state_t
   use pd_strain, only: determinant, force_state_block, green_lagrange_block, small_strain_block
+  use pd_timing, only: now, timing_t
   implicit none
   private
 
-  public :: solid_t, force_state, linear_force, control_stiffness
+  public :: solid_t, force_state, internal_force, linear_force, control_stiffness
 
   !> What the points are made of; fixed after set-up.
   type :: solid_t
@@ -36,29 +37,41 @@ contains
     c = factor * 48.0_wp * youngs_modulus / (5.0_wp * pi * delta**2) / weight_sum
   end function control_stiffness
 
-  !> F gives S (radial return; the history goes from step n to n+1) and A.
+  !> u gives F, F gives S (radial return; the history goes from step n to n+1) and A, one block of
+  !> points after the other: what a block has written is in the cache where it is needed next.
   !>
   !> `dissipated`: work of S on dE^p of this step, by the trapezoidal rule, over all points.
   !> `failed`: 0, or the first point whose det F is not positive (NaN included).
-  subroutine force_state(solid, volume, state, a, dissipated, failed)
-    type(solid_t), intent(in)    :: solid
-    real(wp),      intent(in), contiguous :: volume(:)    !! V (n) [m^2]
-    type(state_t), intent(inout) :: state
-    real(wp),      intent(out), contiguous :: a(:, :)      !! A (n,4) xx xy yx yy [N/m^6]
-    real(wp),      intent(out)   :: dissipated   !! [J/m]
-    integer,       intent(out)   :: failed
-    real(wp), allocatable :: dissipated_in(:)
+  subroutine force_state(operators, solid, volume, state, a, timing, dissipated, failed)
+    class(operators_t), intent(inout) :: operators
+    type(solid_t),  intent(in)    :: solid
+    real(wp),       intent(in),    contiguous :: volume(:)   !! V (n) [m^2]
+    type(state_t),  intent(inout) :: state
+    real(wp),       intent(inout), contiguous :: a(:, :)     !! out: A (n,4), weighed [N/m^6]
+    type(timing_t), intent(inout) :: timing
+    real(wp),       intent(out)   :: dissipated              !! [J/m]
+    integer,        intent(out)   :: failed
+    real(wp), allocatable :: dissipated_in(:), times(:, :)
     integer,  allocatable :: failed_in(:)
-    integer :: block, n, n_blocks
+    integer :: block, n_blocks, lo, hi
 
-    n = size(volume)
-    n_blocks = (n + n_block - 1) / n_block
-    allocate (dissipated_in(n_blocks), failed_in(n_blocks))
-    !$omp parallel do schedule(static) default(none) private(block) &
-    !$omp shared(n, n_blocks, solid, volume, state, a, dissipated_in, failed_in)
+    n_blocks = (operators%last_point - operators%first_point) / n_block + 1
+    allocate (dissipated_in(n_blocks), failed_in(n_blocks), times(3, n_blocks))
+    call operators%weigh_displacement(state%displacement)
+    !$omp parallel do schedule(static) default(none) private(block, lo, hi) &
+    !$omp shared(n_blocks, operators, solid, volume, state, a, dissipated_in, failed_in) &
+    !$omp shared(timing, times)
     do block = 1, n_blocks
-      call force_state_of_block((block - 1) * n_block + 1, min(block * n_block, n), solid, &
-        volume, state, a, dissipated_in(block), failed_in(block))
+      lo = operators%first_point + (block - 1) * n_block
+      hi = min(lo + n_block - 1, operators%last_point)
+      if (timing%blocks) times(1, block) = now()
+      call operators%gradient_block(lo, hi, state%displacement, state%deformation_gradient)
+      if (timing%blocks) times(2, block) = now()
+      call deformation_gradient_block(lo, hi, solid%k_inverse, state%deformation_gradient)
+      call force_state_of_block(lo, hi, solid, volume, state, a, dissipated_in(block), &
+        failed_in(block))
+      call operators%weigh_block(lo, hi, a)
+      if (timing%blocks) times(3, block) = now()
     end do
     !$omp end parallel do
     dissipated = sum(dissipated_in)
@@ -66,7 +79,36 @@ contains
     do block = n_blocks, 1, -1
       if (failed_in(block) > 0) failed = failed_in(block)
     end do
+    call timing%lap_blocks([2, 3], times)
   end subroutine force_state
+
+  !> A gives f, with the zero-energy control.
+  subroutine internal_force(operators, solid, u, a, f, timing)
+    class(operators_t), intent(in) :: operators
+    type(solid_t),  intent(in)    :: solid
+    real(wp),       intent(in),    contiguous :: u(:, :)   !! (n,2) [m]
+    real(wp),       intent(in),    contiguous :: a(:, :)   !! A (n,4), weighed [N/m^6]
+    real(wp),       intent(inout), contiguous :: f(:, :)   !! out: (n,2) [N/m^3]
+    type(timing_t), intent(inout) :: timing
+    real(wp), allocatable :: times(:, :)
+    integer :: block, n_blocks, lo, hi
+
+    n_blocks = (operators%last_point - operators%first_point) / n_block + 1
+    allocate (times(3, n_blocks))
+    !$omp parallel do schedule(static) default(none) private(block, lo, hi) &
+    !$omp shared(n_blocks, operators, solid, u, a, f, timing, times)
+    do block = 1, n_blocks
+      lo = operators%first_point + (block - 1) * n_block
+      hi = min(lo + n_block - 1, operators%last_point)
+      if (timing%blocks) times(1, block) = now()
+      call operators%divergence_block(lo, hi, a, f)
+      if (timing%blocks) times(2, block) = now()
+      if (allocated(solid%control)) call operators%control_block(lo, hi, solid%control, u, f)
+      if (timing%blocks) times(3, block) = now()
+    end do
+    !$omp end parallel do
+    call timing%lap_blocks([4, 5], times)
+  end subroutine internal_force
 
   !> The same for points lo to hi.
   pure subroutine force_state_of_block(lo, hi, solid, volume, state, a, dissipated, failed)
@@ -124,24 +166,27 @@ contains
   !> Internal force of a small displacement of the unloaded elastic body: the linearised
   !> operator, control included.
   subroutine linear_force(operators, solid, u, h, a, f)
-    class(operators_t), intent(in)    :: operators
-    type(solid_t),     intent(in)    :: solid
-    real(wp),          intent(in), contiguous :: u(:, :)   !! (n,2) [m]
-    real(wp),          intent(inout), contiguous :: h(:, :)   !! work space (n,4)
-    real(wp),          intent(inout), contiguous :: a(:, :)   !! work space (n,4)
-    real(wp),          intent(out), contiguous :: f(:, :)   !! (n,2) [N/m^3]
-    integer :: lo, n
+    class(operators_t), intent(inout) :: operators
+    type(solid_t),      intent(in)    :: solid
+    real(wp), intent(in),    contiguous :: u(:, :)   !! (n,2) [m]
+    real(wp), intent(inout), contiguous :: h(:, :)   !! work space (n,4)
+    real(wp), intent(inout), contiguous :: a(:, :)   !! work space (n,4)
+    real(wp), intent(inout), contiguous :: f(:, :)   !! out: (n,2) [N/m^3]
+    type(timing_t) :: timing
+    integer :: lo, hi
 
-    n = operators%n
-    call operators%gradient(u, h)
-    call deformation_gradient(solid%k_inverse, h)
-    !$omp parallel do schedule(static) default(none) shared(n, solid, h, a) private(lo)
-    do lo = 1, n, n_block
-      call linear_force_state_block(lo, min(lo + n_block - 1, n), solid, h, a)
+    call operators%weigh_displacement(u)
+    !$omp parallel do schedule(static) default(none) private(lo, hi) &
+    !$omp shared(operators, solid, u, h, a)
+    do lo = operators%first_point, operators%last_point, n_block
+      hi = min(lo + n_block - 1, operators%last_point)
+      call operators%gradient_block(lo, hi, u, h)
+      call deformation_gradient_block(lo, hi, solid%k_inverse, h)
+      call linear_force_state_block(lo, hi, solid, h, a)
+      call operators%weigh_block(lo, hi, a)
     end do
     !$omp end parallel do
-    call operators%divergence(a, f)
-    if (allocated(solid%control)) call operators%add_control(solid%control, u, f)
+    call internal_force(operators, solid, u, a, f, timing)
   end subroutine linear_force
 
   !> A of a small displacement of points lo to hi, from F.

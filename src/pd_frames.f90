@@ -2,18 +2,41 @@
 module pd_frames
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   use pd_errors, only: error_list_t
-  use pd_hdf5, only: create_group, flush_file, hdf5_file_t, overwrite_dataset, read_attribute, &
+  use pd_hdf5, only: create_group, flush_file, hdf5_file_t, overwrite_rows, read_attribute, &
     read_dataset, reserve_dataset, write_attribute
   use pd_kinds, only: wp
   use pd_xdmf, only: field_t
   implicit none
   private
 
-  public :: frame_fields_t, fields_of_a_frame, frame_name
+  public :: frame_source_t, frame_fields_t, fields_of_a_frame, frame_name
   public :: reserve_frame, put_frame, mark_frame, copy_frame, label
 
+  !> Where the fields of a frame come from, one after the other: a large body has no room for all
+  !> of them at once.
+  type, abstract :: frame_source_t
+  contains
+    procedure(number_of), deferred :: points
+    procedure(field_of), deferred :: field
+  end type frame_source_t
+
+  abstract interface
+    !> Number of points.
+    pure integer function number_of(self)
+      import :: frame_source_t
+      class(frame_source_t), intent(in) :: self
+    end function number_of
+    !> One of `fields_of_a_frame`, point by point as it goes to the file.
+    subroutine field_of(self, name, values)
+      import :: frame_source_t, wp
+      class(frame_source_t), intent(in) :: self
+      character(*), intent(in)  :: name
+      real(wp),     intent(out), contiguous :: values(:, :)   !! (components,points)
+    end subroutine field_of
+  end interface
+
   !> The fields of one frame over the n points.
-  type :: frame_fields_t
+  type, extends(frame_source_t) :: frame_fields_t
     real(wp), allocatable :: displacement(:, :)   !! (n,2) [m]
     real(wp), allocatable :: velocity(:, :)       !! (n,2) [m/s]
     real(wp), allocatable :: stress(:, :)         !! (n,4) xx yy zz xy [Pa]
@@ -21,6 +44,9 @@ module pd_frames
     real(wp), allocatable :: plastic_strain(:)    !! (n)
     real(wp), allocatable :: von_mises(:)         !! (n) [Pa]
     real(wp), allocatable :: zero_energy(:)       !! (n)
+  contains
+    procedure :: points => points_of_fields
+    procedure :: field => one_of_fields
   end type frame_fields_t
 
   type(field_t), parameter :: fields_of_a_frame(7) = [ &
@@ -92,20 +118,50 @@ contains
     call write_attribute(file, name, 'description', description, errors)
   end subroutine label
 
-  !> Write the data of a frame and hand them to the operating system.
-  subroutine put_frame(file, group, fields, errors)
-    type(hdf5_file_t),    intent(inout) :: file
-    character(*),         intent(in)    :: group
-    type(frame_fields_t), intent(in)    :: fields
-    type(error_list_t),   intent(inout) :: errors
+  pure integer function points_of_fields(self) result(n)
+    class(frame_fields_t), intent(in) :: self
 
-    call overwrite_dataset(file, group//'/displacement', fields%displacement, errors)
-    call overwrite_dataset(file, group//'/velocity', fields%velocity, errors)
-    call overwrite_dataset(file, group//'/stress', fields%stress, errors)
-    call overwrite_dataset(file, group//'/strain', fields%strain, errors)
-    call overwrite_dataset(file, group//'/plastic_strain', fields%plastic_strain, errors)
-    call overwrite_dataset(file, group//'/von_mises', fields%von_mises, errors)
-    call overwrite_dataset(file, group//'/zero_energy', fields%zero_energy, errors)
+    n = size(self%plastic_strain)
+  end function points_of_fields
+
+  subroutine one_of_fields(self, name, values)
+    class(frame_fields_t), intent(in)  :: self
+    character(*),          intent(in)  :: name
+    real(wp),              intent(out), contiguous :: values(:, :)
+
+    select case (name)
+    case ('displacement')
+      values = transpose(self%displacement)
+    case ('velocity')
+      values = transpose(self%velocity)
+    case ('stress')
+      values = transpose(self%stress)
+    case ('strain')
+      values = transpose(self%strain)
+    case ('plastic_strain')
+      values(1, :) = self%plastic_strain
+    case ('von_mises')
+      values(1, :) = self%von_mises
+    case ('zero_energy')
+      values(1, :) = self%zero_energy
+    end select
+  end subroutine one_of_fields
+
+  !> Write the data of a frame and hand them to the operating system.
+  subroutine put_frame(file, group, source, errors)
+    type(hdf5_file_t),     intent(inout) :: file
+    character(*),          intent(in)    :: group
+    class(frame_source_t), intent(in)    :: source
+    type(error_list_t),    intent(inout) :: errors
+    real(wp), allocatable :: values(:, :)
+    integer :: i
+
+    do i = 1, size(fields_of_a_frame)
+      allocate (values(fields_of_a_frame(i)%width, source%points()))
+      call source%field(trim(fields_of_a_frame(i)%name), values)
+      call overwrite_rows(file, group//'/'//trim(fields_of_a_frame(i)%name), values, errors)
+      deallocate (values)
+    end do
     call flush_file(file, errors)
   end subroutine put_frame
 

@@ -22,7 +22,7 @@ module pd_hdf5
 
   public :: hdf5_file_t, create_file, open_file, flush_file, close_file
   public :: create_group, object_exists
-  public :: reserve_dataset, write_dataset, overwrite_dataset, read_dataset
+  public :: reserve_dataset, write_dataset, overwrite_dataset, overwrite_rows, read_dataset
   public :: write_attribute, read_attribute
 
   !> Put an array into the file as a new dataset.
@@ -173,6 +173,25 @@ contains
     allocate (buffer, source=transpose(values))
     call put_data(file, name, h5t_native_double, c_loc(buffer), errors)
   end subroutine overwrite_real_2
+
+  !> Write into a dataset that is there, from an array that lies in memory as in the file: all
+  !> components of a point together.
+  !>
+  !> Errors: another shape, a file that cannot be written.
+  subroutine overwrite_rows(file, name, values, errors)
+    type(hdf5_file_t),  intent(inout) :: file
+    character(*),       intent(in)    :: name
+    real(wp), target,   intent(in), contiguous :: values(:, :)   !! (components,points)
+    type(error_list_t), intent(inout) :: errors
+
+    if (size(values, 1) == 1) then
+      call expect_shape(file, name, [size(values, 2)], errors)
+    else
+      call expect_shape(file, name, [size(values, 2), size(values, 1)], errors)
+    end if
+    if (size(values) > 0) &
+      call put_data(file, name, h5t_native_double, c_loc(values), errors)
+  end subroutine overwrite_rows
 
   subroutine write_integer_1(file, name, values, errors)
     type(hdf5_file_t),  intent(inout) :: file

@@ -3,12 +3,12 @@
 !> Source: doc/theory.md, section 2.
 module pd_kinematics
   use pd_errors, only: error_list_t
-  use pd_kinds, only: n_block, wp
+  use pd_kinds, only: wp
   use pd_operators, only: operators_t
   implicit none
   private
 
-  public :: inverse_shape_tensor, deformation_gradient
+  public :: inverse_shape_tensor, deformation_gradient_block
 
 contains
 
@@ -57,27 +57,11 @@ contains
     end if
   end subroutine inverse_shape_tensor
 
-  !> F = I + G[u] K^-1.
-  !>
-  !> `gradient` may be the array that receives F.
-  subroutine deformation_gradient(k_inverse, gradient)
-    real(wp), intent(in), contiguous :: k_inverse(:, :)  !! (n,3) xx yy xy [1/m^4]
-    real(wp), intent(inout), contiguous :: gradient(:, :)   !! (n,4) xx xy yx yy; G[u] [m^4] -> F
-    integer :: lo, n
-
-    n = size(gradient, 1)
-    !$omp parallel do schedule(static) default(none) shared(n, k_inverse, gradient) private(lo)
-    do lo = 1, n, n_block
-      call deformation_gradient_block(lo, min(lo + n_block - 1, n), k_inverse, gradient)
-    end do
-    !$omp end parallel do
-  end subroutine deformation_gradient
-
-  !> The same for points lo to hi.
+  !> F = I + G[u] K^-1 of points lo to hi, in the place of G[u].
   pure subroutine deformation_gradient_block(lo, hi, k_inverse, gradient)
     integer,  intent(in) :: lo, hi
-    real(wp), intent(in),    contiguous :: k_inverse(:, :)
-    real(wp), intent(inout), contiguous :: gradient(:, :)
+    real(wp), intent(in),    contiguous :: k_inverse(:, :)  !! (n,3) xx yy xy [1/m^4]
+    real(wp), intent(inout), contiguous :: gradient(:, :)   !! (n,4) xx xy yx yy; G[u] [m^4] -> F
     integer  :: i
     real(wp) :: gxx, gxy, gyx, gyy
 

@@ -12,7 +12,7 @@ module pd_observe
   implicit none
   private
 
-  public :: ledger_t, observation_t, observe, running_away, point_fields
+  public :: ledger_t, observation_t, observe, running_away, point_field
 
   !> Energies that are added up step by step [J/m], and what the balance refers to.
   type :: ledger_t
@@ -146,34 +146,56 @@ contains
       ledger%initial_kinetic_energy) + tiny(1.0_wp)
   end function running_away
 
-  !> Fields for a frame: Cauchy stress, strain, von Mises stress, and the rms of the zero-energy
-  !> part of the deformation, weighted with omega V over the family, over the horizon. A point that
-  !> has failed (det F <= 0) has no Cauchy stress: 0.
-  subroutine point_fields(body, operators, state, delta, stress, strain, mises, zero_energy)
-    type(body_t),      intent(in)  :: body
+  !> A field of a frame, for the points without voids: displacement, velocity, Cauchy stress,
+  !> strain, plastic_strain, von_mises, or zero_energy: the rms of the zero-energy part of the
+  !> deformation, weighted with omega V over the family, over the horizon. A point that has failed
+  !> (det F <= 0) has no Cauchy stress: 0.
+  subroutine point_field(name, body, operators, state, delta, values)
+    character(*),       intent(in)  :: name
+    type(body_t),       intent(in)  :: body
     class(operators_t), intent(in)  :: operators
-    type(state_t),     intent(in)  :: state
-    real(wp),          intent(in)  :: delta            !! horizon [m]
-    real(wp),          intent(out) :: stress(:, :)     !! (n,4) xx yy zz xy [Pa]
-    real(wp),          intent(out) :: strain(:, :)     !! (n,4) xx yy zz xy
-    real(wp),          intent(out) :: mises(:)         !! (n) [Pa]
-    real(wp),          intent(out) :: zero_energy(:)   !! (n)
-    integer  :: i
-    real(wp) :: f(4)
+    type(state_t),      intent(in)  :: state
+    real(wp),           intent(in)  :: delta                       !! horizon [m]
+    real(wp),           intent(out), contiguous :: values(:, :)    !! (components,points)
+    real(wp), allocatable :: z2(:)
+    integer :: i, p
 
-    call operators%zero_energy_squared(state%displacement, &
-      state%deformation_gradient, zero_energy)
-    !$omp parallel do schedule(static) default(none) private(i, f) &
-    !$omp shared(body, operators, state, delta, stress, strain, mises, zero_energy)
-    do i = 1, body%n
-      f = state%deformation_gradient(i, :)
-      stress(i, :) = 0.0_wp
-      if (determinant(f) > 0.0_wp) stress(i, :) = cauchy(f, state%stress(i, :))
-      strain(i, :) = green_lagrange(f)
-      mises(i) = von_mises(stress(i, :))
-      zero_energy(i) = sqrt(zero_energy(i) / operators%weight_sum(i)) / delta
+    if (name == 'zero_energy') then
+      allocate (z2(body%n))
+      call operators%zero_energy_squared(state%displacement, state%deformation_gradient, z2)
+    end if
+    !$omp parallel do schedule(static) default(none) private(i, p) &
+    !$omp shared(name, body, operators, state, delta, values, z2)
+    do i = 1, size(body%points)
+      p = body%points(i)
+      select case (name)
+      case ('displacement')
+        values(:, i) = state%displacement(p, :)
+      case ('velocity')
+        values(:, i) = state%velocity(p, :)
+      case ('stress')
+        values(:, i) = cauchy_or_zero(state%deformation_gradient(p, :), state%stress(p, :))
+      case ('strain')
+        values(:, i) = green_lagrange(state%deformation_gradient(p, :))
+      case ('plastic_strain')
+        values(1, i) = state%alpha(p)
+      case ('von_mises')
+        values(1, i) = von_mises(cauchy_or_zero(state%deformation_gradient(p, :), &
+          state%stress(p, :)))
+      case ('zero_energy')
+        values(1, i) = sqrt(z2(p) / operators%weight_sum(p)) / delta
+      end select
     end do
     !$omp end parallel do
-  end subroutine point_fields
+  end subroutine point_field
+
+  !> Cauchy stress; 0 where det F is not positive.
+  pure function cauchy_or_zero(f, s) result(stress)
+    real(wp), intent(in) :: f(4), s(4)   !! F xx xy yx yy; S xx yy zz xy [Pa]
+    real(wp) :: stress(4)                !! xx yy zz xy [Pa]
+
+    stress = 0.0_wp
+    if (determinant(f) > 0.0_wp) stress = cauchy(f, s)
+  end function cauchy_or_zero
 
 end module pd_observe

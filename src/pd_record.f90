@@ -14,9 +14,9 @@ module pd_record
   use pd_input, only: compare_used, used_values
   use pd_input_types, only: input_t
   use pd_kinds, only: wp
-  use pd_observe, only: ledger_t, observation_t, observe, point_fields
+  use pd_observe, only: ledger_t, observation_t, observe, point_field
   use pd_progress, only: close_progress, open_progress, progress_t, say, show_progress, status_t
-  use pd_result, only: create_result, finish_result, frame_fields_t, provenance_t, &
+  use pd_result, only: create_result, finish_result, frame_source_t, provenance_t, &
     result_exists, result_t, resume_result, run_description_t, write_failed_frame, write_frame
   use pd_schedule, only: schedule_t
   use pd_setup, only: model_t
@@ -39,6 +39,15 @@ module pd_record
     type(observation_t) :: seen                  !! of the last row
     integer :: frames = 0                        !! written so far, 000000 among them
   end type record_t
+
+  !> The present state as the source of a frame.
+  type, extends(frame_source_t) :: state_frame_t
+    type(model_t), pointer :: model => null()
+    type(state_t), pointer :: state => null()
+  contains
+    procedure :: points => points_of_state
+    procedure :: field => field_of_state
+  end type state_frame_t
 
   character(*), parameter :: ledger_names(5) = [character(24) :: 'initial_kinetic_energy', &
     'plastic_dissipation', 'damping_dissipation', 'external_work', 'largest_work']
@@ -201,59 +210,55 @@ contains
 
   !> Write the next frame.
   subroutine record_frame(model, state, step, record, errors)
-    type(model_t),      intent(in)    :: model
-    type(state_t),      intent(in)    :: state
+    type(model_t), target, intent(in) :: model
+    type(state_t), target, intent(in) :: state
     integer,            intent(in)    :: step
     type(record_t),     intent(inout) :: record
     type(error_list_t), intent(inout) :: errors
-    type(frame_fields_t) :: fields
+    type(state_frame_t) :: source
     real(wp) :: time
 
     time = real(step, wp) * model%motion%time_step
-    call gather_fields(model, state, fields)
+    source%model => model
+    source%state => state
     call write_frame(record%result, record%frames, step, time, strain_at(model, state, time), &
-      fields, errors)
+      source, errors)
     record%frames = record%frames + 1
   end subroutine record_frame
 
   !> Write the state of a run that has failed, marked as not valid.
   subroutine record_failure(model, state, step, record, errors)
-    type(model_t),      intent(in)    :: model
-    type(state_t),      intent(in)    :: state
+    type(model_t), target, intent(in) :: model
+    type(state_t), target, intent(in) :: state
     integer,            intent(in)    :: step
     type(record_t),     intent(inout) :: record
     type(error_list_t), intent(inout) :: errors
-    type(frame_fields_t) :: fields
+    type(state_frame_t) :: source
     real(wp) :: time
 
     time = real(step, wp) * model%motion%time_step
-    call gather_fields(model, state, fields)
-    call write_failed_frame(record%result, step, time, strain_at(model, state, time), fields, &
+    source%model => model
+    source%state => state
+    call write_failed_frame(record%result, step, time, strain_at(model, state, time), source, &
       errors)
   end subroutine record_failure
 
-  !> The fields of a frame.
-  subroutine gather_fields(model, state, fields)
-    type(model_t), intent(in) :: model
-    type(state_t), intent(in) :: state
-    type(frame_fields_t), intent(out) :: fields
-    real(wp), allocatable :: stress(:, :), strain(:, :), mises(:), zero_energy(:)
-    integer :: n
+  !> Points of a frame.
+  pure integer function points_of_state(self) result(n)
+    class(state_frame_t), intent(in) :: self
 
-    n = model%body%n
-    allocate (stress(n, 4), strain(n, 4), mises(n), zero_energy(n))
-    call point_fields(model%body, model%operators, state, model%delta, stress, strain, mises, &
-      zero_energy)
-    associate (places => model%body%points)
-      fields%displacement = state%displacement(places, :)
-      fields%velocity = state%velocity(places, :)
-      fields%plastic_strain = state%alpha(places)
-      fields%stress = stress(places, :)
-      fields%strain = strain(places, :)
-      fields%von_mises = mises(places)
-      fields%zero_energy = zero_energy(places)
-    end associate
-  end subroutine gather_fields
+    n = size(self%model%body%points)
+  end function points_of_state
+
+  !> A field of a frame.
+  subroutine field_of_state(self, name, values)
+    class(state_frame_t), intent(in) :: self
+    character(*), intent(in)  :: name
+    real(wp),     intent(out), contiguous :: values(:, :)   !! (components,points)
+
+    call point_field(name, self%model%body, self%model%operators, self%state, self%model%delta, &
+      values)
+  end subroutine field_of_state
 
   !> Show where the run stands; axial stress and largest alpha are those of the last row.
   subroutine record_progress(model, state, schedule, step, record, errors)

@@ -8,8 +8,8 @@ module pd_result
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   use pd_errors, only: error_list_t
   use pd_files, only: file_exists, replace_file
-  use pd_frames, only: copy_frame, fields_of_a_frame, frame_fields_t, frame_name, label, &
-    mark_frame, put_frame, reserve_frame
+  use pd_frames, only: copy_frame, fields_of_a_frame, frame_fields_t, frame_name, frame_source_t, &
+    label, mark_frame, put_frame, reserve_frame
   use pd_hdf5, only: close_file, create_file, create_group, flush_file, hdf5_file_t, open_file, &
     read_attribute, write_attribute, write_dataset
   use pd_kinds, only: wp
@@ -18,7 +18,7 @@ module pd_result
   implicit none
   private
 
-  public :: provenance_t, run_description_t, frame_fields_t, result_t
+  public :: provenance_t, run_description_t, frame_source_t, frame_fields_t, result_t
   public :: create_result, resume_result, write_frame, write_failed_frame, finish_result
   public :: result_exists, utc_time
 
@@ -126,12 +126,12 @@ contains
   !> Write frame `index` (0: the unloaded state) and renew the XDMF file.
   !>
   !> Errors: a file cannot be written; the frames before this one stay readable.
-  subroutine write_frame(result, index, step, time, strain, fields, errors)
+  subroutine write_frame(result, index, step, time, strain, source, errors)
     type(result_t),       intent(inout) :: result
     integer,              intent(in)    :: index, step
     real(wp),             intent(in)    :: time     !! [s]
     real(wp),             intent(in)    :: strain   !! nominal; without platens any number
-    type(frame_fields_t), intent(in)    :: fields
+    class(frame_source_t), intent(in)   :: source
     type(error_list_t),   intent(inout) :: errors
     type(hdf5_file_t) :: file
     integer :: before
@@ -142,7 +142,7 @@ contains
       return
     end if
     call open_file(file, result%path, .true., errors)
-    call put_frame(file, frame_name(index), fields, errors)
+    call put_frame(file, frame_name(index), source, errors)
     call mark_frame(file, frame_name(index), step, time, frame_strain(result, strain), .true., &
       errors)
     call close_file(file, errors)
@@ -154,16 +154,16 @@ contains
   !> Write the state in which a run failed, marked as not valid, beside the frames.
   !>
   !> Errors: the file cannot be written.
-  subroutine write_failed_frame(result, step, time, strain, fields, errors)
+  subroutine write_failed_frame(result, step, time, strain, source, errors)
     type(result_t),       intent(in)    :: result
     integer,              intent(in)    :: step
     real(wp),             intent(in)    :: time, strain   !! [s], nominal
-    type(frame_fields_t), intent(in)    :: fields
+    class(frame_source_t), intent(in)   :: source
     type(error_list_t),   intent(inout) :: errors
     type(hdf5_file_t) :: file
 
     call open_file(file, result%path, .true., errors)
-    call put_frame(file, '/failed_frame', fields, errors)
+    call put_frame(file, '/failed_frame', source, errors)
     call mark_frame(file, '/failed_frame', step, time, frame_strain(result, strain), .false., &
       errors)
     call close_file(file, errors)

@@ -259,6 +259,8 @@ contains
 
     model%motion%density = input%material%density
     model%motion%damping = input%integration%damping
+    model%motion%first = model%operators%first_point
+    model%motion%last = model%operators%last_point
     if (input%platens(1) == 0) return
     associate (p => model%platens, body => model%body)
       p%first = input%platens(1)

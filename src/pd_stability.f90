@@ -27,7 +27,7 @@ contains
   !> the eigenvalue from below; the iteration ends when it has risen by less than 1e-3 of itself in
   !> ten iterations, and as much is added. The start vector is the same for every run.
   subroutine highest_frequency(operators, solid, volume, free, frequency, iterations)
-    class(operators_t), intent(in) :: operators
+    class(operators_t), intent(inout) :: operators
     type(solid_t),     intent(in)  :: solid
     real(wp),          intent(in), contiguous :: volume(:)     !! V (n) [m^2]
     real(wp),          intent(in), contiguous :: free(:, :)    !! 1: free, 0: prescribed (n,2)

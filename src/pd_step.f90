@@ -3,33 +3,19 @@
 !> u gives F, F gives S and A, A gives f, f gives v.
 !> Source: doc/theory.md, section 6.
 module pd_step
-  use, intrinsic :: iso_fortran_env, only: int64
   use pd_boundary, only: boundary_forces, boundary_t, motion_work, move
-  use pd_force, only: force_state
+  use pd_force, only: force_state, internal_force
   use pd_kinds, only: wp
-  use pd_kinematics, only: deformation_gradient
   use pd_loads, only: apply_loads, load_work
   use pd_observe, only: ledger_t
   use pd_setup, only: damping_frame, model_t
   use pd_state, only: state_t
+  use pd_timing, only: timing_t
   use pd_verlet, only: kick, kick_and_drift
   implicit none
   private
 
-  public :: timing_t, take_step, kernel_names
-
-  !> Names of the kernels in the order of `timing_t%seconds`.
-  character(10), parameter :: kernel_names(6) = [character(10) :: 'motion', 'gradient', 'stress', &
-    'divergence', 'control', 'boundaries']
-
-  !> Wall clock time spent in each kernel [s].
-  type :: timing_t
-    real(wp) :: seconds(size(kernel_names)) = 0.0_wp
-    integer(int64), private :: last = 0
-  contains
-    procedure, private :: begin
-    procedure, private :: lap
-  end type timing_t
+  public :: take_step
 
 contains
 
@@ -49,26 +35,18 @@ contains
 
     t = real(step - 1, wp) * model%motion%time_step
     t_next = real(step, wp) * model%motion%time_step
-    call timing%begin()
+    call timing%begin(step)
     associate (x => model%body%position, volume => model%body%volume, free => model%free, &
-      u => state%displacement, v => state%velocity, f => state%force, &
-      f_grad => state%deformation_gradient)
+      u => state%displacement, v => state%velocity, f => state%force)
       call kick_and_drift(model%motion, damping_frame(model, t), x, volume, free, f, v, u, &
         first_work)
       call timing%lap(1)
       call move(model%boundaries, x, t_next, u, v)
       loads_work = load_work(model%pressures, model%boundaries, v, t, t_next)
       call timing%lap(6)
-      call model%operators%gradient(u, f_grad)
-      call timing%lap(2)
-      call deformation_gradient(model%solid%k_inverse, f_grad)
-      call force_state(model%solid, volume, state, a, dissipated, failed_point)
-      call timing%lap(3)
-      call model%operators%divergence(a, f)
-      call timing%lap(4)
-      if (allocated(model%solid%control)) &
-        call model%operators%add_control(model%solid%control, u, f)
-      call timing%lap(5)
+      call force_state(model%operators, model%solid, volume, state, a, timing, dissipated, &
+        failed_point)
+      call internal_force(model%operators, model%solid, u, a, f, timing)
       call apply_loads(model%pressures, model%boundaries, volume, t_next, f)
       call timing%lap(6)
       call kick(model%motion, damping_frame(model, t_next), x, volume, free, f, v, second_work)
@@ -84,23 +62,5 @@ contains
     ledger%largest_work = max(ledger%largest_work, abs(ledger%external_work))
     call timing%lap(6)
   end subroutine take_step
-
-  !> Start the clock.
-  subroutine begin(self)
-    class(timing_t), intent(inout) :: self
-
-    call system_clock(self%last)
-  end subroutine begin
-
-  !> Give the time since the last call to a kernel.
-  subroutine lap(self, kernel)
-    class(timing_t), intent(inout) :: self
-    integer,         intent(in)    :: kernel
-    integer(int64) :: now, rate
-
-    call system_clock(now, rate)
-    self%seconds(kernel) = self%seconds(kernel) + real(now - self%last, wp) / real(rate, wp)
-    self%last = now
-  end subroutine lap
 
 end module pd_step

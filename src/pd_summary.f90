@@ -162,7 +162,7 @@ contains
   !> Wall clock time of the run [s], from the fastest of a few applications of the linear operator
   !> to this very model.
   real(wp) function estimated_seconds(model, schedule) result(seconds)
-    type(model_t),    intent(in) :: model
+    type(model_t),    intent(inout) :: model
     type(schedule_t), intent(in) :: schedule
     !> A step with radial return, motion and energies against one with the linear operator.
     real(wp), parameter :: whole_step = 1.5_wp
@@ -171,7 +171,7 @@ contains
     integer(int64) :: start, finish, rate
     integer :: k
 
-    allocate (h(model%body%n, 4), a(model%body%n, 4), f(model%body%n, 2))
+    allocate (h(model%body%n, 4), a(model%body%n, 4), f(model%body%n, 2), source=0.0_wp)
     allocate (u(model%body%n, 2), source=0.0_wp)
     seconds = huge(1.0_wp)
     do k = 1, repetitions

@@ -20,6 +20,8 @@ module pd_verlet
     integer  :: axis = 2                !! along which v_ref varies
     real(wp) :: start = 0.0_wp          !! coordinate where v_ref is that of the lower end [m]
     real(wp) :: length = 1.0_wp         !! from there to the upper end [m]
+    integer  :: first = 1               !! between this point
+    integer  :: last = huge(1)          !! and this one all points lie that are no voids
   end type motion_t
 
   !> Velocity against which the damping acts: linear between two ends, constant beyond them.
@@ -63,15 +65,17 @@ contains
     real(wp),       intent(inout), contiguous :: u(:, :)          !! u^n -> u^{n+1} (n,2) [m]
     real(wp),       intent(out)   :: work(2)          !! [J/m]
     real(wp), allocatable :: work_in(:, :)
-    integer :: block, n_blocks
+    integer :: block, n_blocks, lo, last
 
-    n_blocks = (size(volume) + n_block - 1) / n_block
+    last = min(motion%last, size(volume))
+    n_blocks = (last - motion%first) / n_block + 1
     allocate (work_in(2, n_blocks))
-    !$omp parallel do schedule(static) default(none) private(block) &
-    !$omp shared(n_blocks, motion, frame, position, volume, free, f, v, u, work_in)
+    !$omp parallel do schedule(static) default(none) private(block, lo) &
+    !$omp shared(n_blocks, last, motion, frame, position, volume, free, f, v, u, work_in)
     do block = 1, n_blocks
-      call kick_and_drift_block((block - 1) * n_block + 1, min(block * n_block, size(volume)), &
-        motion, frame, position(:, motion%axis), volume, free, f, v, u, work_in(:, block))
+      lo = motion%first + (block - 1) * n_block
+      call kick_and_drift_block(lo, min(lo + n_block - 1, last), motion, frame, &
+        position(:, motion%axis), volume, free, f, v, u, work_in(:, block))
     end do
     !$omp end parallel do
     work = sum(work_in, dim=2)
@@ -127,15 +131,17 @@ contains
     real(wp),       intent(inout), contiguous :: v(:, :)          !! v^{n+1/2} -> v^{n+1} [m/s]
     real(wp),       intent(out)   :: work(2)          !! [J/m]
     real(wp), allocatable :: work_in(:, :)
-    integer :: block, n_blocks
+    integer :: block, n_blocks, lo, last
 
-    n_blocks = (size(volume) + n_block - 1) / n_block
+    last = min(motion%last, size(volume))
+    n_blocks = (last - motion%first) / n_block + 1
     allocate (work_in(2, n_blocks))
-    !$omp parallel do schedule(static) default(none) private(block) &
-    !$omp shared(n_blocks, motion, frame, position, volume, free, f, v, work_in)
+    !$omp parallel do schedule(static) default(none) private(block, lo) &
+    !$omp shared(n_blocks, last, motion, frame, position, volume, free, f, v, work_in)
     do block = 1, n_blocks
-      call kick_block((block - 1) * n_block + 1, min(block * n_block, size(volume)), &
-        motion, frame, position(:, motion%axis), volume, free, f, v, work_in(:, block))
+      lo = motion%first + (block - 1) * n_block
+      call kick_block(lo, min(lo + n_block - 1, last), motion, frame, &
+        position(:, motion%axis), volume, free, f, v, work_in(:, block))
     end do
     !$omp end parallel do
     work = sum(work_in, dim=2)

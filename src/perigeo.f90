@@ -23,9 +23,10 @@ program perigeo
   use pd_setup, only: find_highest_frequency, model_t, set_up_body, set_up_model, &
     set_up_schedule, start
   use pd_state, only: state_t
-  use pd_step, only: kernel_names, take_step, timing_t
+  use pd_step, only: take_step
   use pd_summary, only: estimated_seconds, summarise, summary_t
   use pd_system, only: catch_signals, exit_program, pending_signal, sigint
+  use pd_timing, only: kernel_names, timing_t
   use pd_version, only: code_version, git_hash
   implicit none
 
@@ -119,7 +120,7 @@ contains
       call exit_program(exit_ok)
     end if
 
-    allocate (a(model%body%n, 4))
+    allocate (a(model%body%n, 4), source=0.0_wp)   ! voids stay zero
     if (checkpoint%history_rows > 0) then
       state = state%scattered(model%body%points, model%body%n)
       call boundary_forces(model%body%position, model%body%volume, checkpoint%time, &

@@ -4,12 +4,13 @@ module samples
   use pd_bond_list, only: bond_list_t, new_bond_list
   use pd_errors, only: error_list_t
   use pd_families, only: horizon_t, new_horizon
-  use pd_force, only: control_stiffness, force_state, solid_t
+  use pd_force, only: control_stiffness, force_of => internal_force, force_state, solid_t
   use pd_geometry, only: body_t, lattice_body, lattice_t, layer_t
   use pd_j2, only: new_j2
   use pd_kinds, only: wp
-  use pd_kinematics, only: deformation_gradient, inverse_shape_tensor
+  use pd_kinematics, only: inverse_shape_tensor
   use pd_state, only: state_t
+  use pd_timing, only: timing_t
   implicit none
   private
 
@@ -187,23 +188,20 @@ contains
 
   !> Displacement gives F, S and the internal force density, control included.
   subroutine internal_force(operators, solid, volume, state, dissipated, failed)
-    type(bond_list_t), intent(in)    :: operators
+    type(bond_list_t), intent(inout) :: operators
     type(solid_t),     intent(in)    :: solid
     real(wp),          intent(in)    :: volume(:)
     type(state_t),     intent(inout) :: state
     real(wp), intent(out), optional :: dissipated
     integer,  intent(out), optional :: failed
     real(wp), allocatable :: a(:, :)
+    type(timing_t) :: timing
     real(wp) :: work
     integer  :: first
 
     allocate (a(size(volume), 4))
-    call operators%gradient(state%displacement, state%deformation_gradient)
-    call deformation_gradient(solid%k_inverse, state%deformation_gradient)
-    call force_state(solid, volume, state, a, work, first)
-    call operators%divergence(a, state%force)
-    if (allocated(solid%control)) &
-      call operators%add_control(solid%control, state%displacement, state%force)
+    call force_state(operators, solid, volume, state, a, timing, work, first)
+    call force_of(operators, solid, state%displacement, a, state%force, timing)
     if (present(dissipated)) dissipated = work
     if (present(failed)) failed = first
   end subroutine internal_force

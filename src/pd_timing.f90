@@ -1,0 +1,76 @@
+!> Where the time of a step goes.
+!>
+!> Kernels that follow one another on each block of points run in one loop. Every now and then the
+!> blocks are timed, and the time of the loop is given to its kernels in those proportions.
+module pd_timing
+  use, intrinsic :: iso_fortran_env, only: int64
+  use pd_kinds, only: wp
+  implicit none
+  private
+
+  public :: timing_t, kernel_names, now
+
+  !> Names of the kernels in the order of `timing_t%seconds`.
+  character(10), parameter :: kernel_names(6) = [character(10) :: 'motion', 'gradient', 'stress', &
+    'divergence', 'control', 'boundaries']
+  integer, parameter :: timed_step = 20   !! every so many steps the blocks are timed
+
+  !> Wall clock time spent in each kernel [s].
+  type :: timing_t
+    real(wp) :: seconds(size(kernel_names)) = 0.0_wp
+    logical  :: blocks = .true.                        !! blocks are timed in this step
+    real(wp), private :: last = 0.0_wp
+    real(wp), private :: part(size(kernel_names)) = 1.0_wp   !! of the blocks when last timed
+  contains
+    procedure :: begin
+    procedure :: lap
+    procedure :: lap_blocks
+  end type timing_t
+
+contains
+
+  !> Wall clock time [s].
+  real(wp) function now()
+    integer(int64) :: count, rate
+
+    call system_clock(count, rate)
+    now = real(count, wp) / real(rate, wp)
+  end function now
+
+  !> Start the clock of a step.
+  subroutine begin(self, step)
+    class(timing_t), intent(inout) :: self
+    integer,         intent(in)    :: step
+
+    self%blocks = modulo(step, timed_step) == 1
+    self%last = now()
+  end subroutine begin
+
+  !> Give the time since the last call to a kernel.
+  subroutine lap(self, kernel)
+    class(timing_t), intent(inout) :: self
+    integer,         intent(in)    :: kernel
+    real(wp) :: time
+
+    time = now()
+    self%seconds(kernel) = self%seconds(kernel) + (time - self%last)
+    self%last = time
+  end subroutine lap
+
+  !> Give the time since the last call to two kernels that ran block by block: `times` holds the
+  !> clock before, between and behind them where blocks are timed.
+  subroutine lap_blocks(self, kernels, times)
+    class(timing_t), intent(inout) :: self
+    integer,         intent(in)    :: kernels(2)
+    real(wp),        intent(in)    :: times(:, :)   !! (3,blocks) [s]
+    real(wp) :: time
+
+    if (self%blocks) self%part(kernels) = [sum(times(2, :) - times(1, :)), &
+      sum(times(3, :) - times(2, :))]
+    time = now()
+    if (sum(self%part(kernels)) > 0.0_wp) self%seconds(kernels) = self%seconds(kernels) &
+      + (time - self%last) * self%part(kernels) / sum(self%part(kernels))
+    self%last = time
+  end subroutine lap_blocks
+
+end module pd_timing
