@@ -58,8 +58,10 @@ build    := build/$(BUILD)
 # ---------------------------------------------------------------------------------- targets
 .SUFFIXES:
 .DELETE_ON_ERROR:
+studies := fig3a fig3b fig4 fig5 horizon loading size softening influence heterogeneity
 .PHONY: all program objects post debug units demo demo-quick test lint verify \
-  layers setup install help clean distclean
+  layers setup install help clean distclean figures $(studies) \
+  report report-view
 .DEFAULT_GOAL := all
 
 help_width := 13
@@ -83,6 +85,30 @@ demo-quick:        ## the same with a coarse body: seconds instead of minutes
 	@sh tools/setup.sh run
 	@$(submake) $(parallel) program
 	@sh tools/demo.sh input/compression_quick.nml results/compression_quick
+
+figures:           ## all studies below: every figure of the paper and the comparison with it
+fig3a:             ## study: apparent modulus against m at a fixed horizon
+fig3b:             ## study: apparent modulus against m at a fixed spacing
+fig4:              ## study: shear bands and their width against m
+fig5:              ## study: shear bands of the reference case at 1, 1.3 and 1.6 % strain
+horizon:           ## study: width of the band against the horizon
+loading:           ## study: platens, rate of loading, confining pressure
+size:              ## study: size and shape of the specimen
+softening:         ## study: kinds of softening, its modulus, the residual strength
+influence:         ## study: influence functions
+heterogeneity:     ## study: soil whose strength varies from place to place
+figures: asked = $(studies)
+figures $(studies):
+	@sh tools/setup.sh run
+	@$(submake) $(parallel) program
+	@sh tools/studies.sh $(or $(asked),$@)
+
+report:            ## results/report.html, one page with all studies, after making what is missing
+	@$(submake) figures || failed=$$?; \
+	  $(venv)/bin/perigeo-post report $(if $(PUBLISH),--publish) && exit $${failed:-0}
+
+report-view:       ## open that page in a browser without a window: checks and screenshots
+	@$(or $(wildcard $(venv)/bin/python),python3) tools/view_report.py
 
 test:              ## set-up, build and the whole test suite; BUILD=debug: with all checks
 	@sh tools/setup.sh test
@@ -120,7 +146,7 @@ distclean: clean   ## remove .venv and results too
 
 help:              ## list the targets
 	@echo 'Targets:'
-	@awk -F ':.*## ' '/^[a-z-]+:.*## / { printf "  make %-12s %s\n", $$1, $$2 }' Makefile
+	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / { printf "  make %-13s %s\n", $$1, $$2 }' Makefile
 	@echo 'Settings:'
 	@echo '  MARCH=x86-64-v3   processor to compile for (native; empty: any)'
 	@echo '  FFLAGS=-O2        optimisation flags (-O3)'
@@ -133,7 +159,7 @@ help:              ## list the targets
 # ---------------------------------------------------------------------------------- compiling
 # The rest needs the compiler and HDF5, which `make demo` may have to install first.
 ifneq ($(filter-out setup demo demo-quick test debug lint verify layers help clean \
-  distclean,\
+  distclean figures $(studies) report report-view,\
   $(or $(MAKECMDGOALS),all)),)
 
 ifeq ($(shell command -v $(firstword $(FC)) 2>/dev/null),)

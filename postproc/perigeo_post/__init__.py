@@ -19,11 +19,11 @@ from .band import (
     Line,
     Profile,
     Width,
-    find_bands,
     line_across,
     profile_along,
     profile_width,
 )
+from .band_search import find_bands
 from .contours import contour_figure
 from .curves import (
     Curve,
@@ -76,6 +76,7 @@ from .measures import (
 )
 from .result import SCHEMA, SCHEMA_VERSIONS, Frame, Run
 from .sampling import PointSet
+from .study import StudyError, StudyOptions, run_study
 from .style import save_figure
 
 __version__ = "0.1.0"
@@ -103,6 +104,8 @@ __all__ = [
     "ResultError",
     "Run",
     "SchemaError",
+    "StudyError",
+    "StudyOptions",
     "Width",
     "__version__",
     "animate",
@@ -131,6 +134,7 @@ __all__ = [
     "profile_width",
     "read_history",
     "run_facts",
+    "run_study",
     "save_figure",
     "stress_strain",
     "stress_strain_figure",

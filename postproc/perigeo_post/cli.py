@@ -1,7 +1,8 @@
 """The command line ``perigeo-post``: reads options, calls the functions, prints.
 
 Exit status: 0 done, 1 wrong command line or something asked for that the result does not hold,
-2 a result that cannot be read, 5 a file that cannot be written.
+2 a result that cannot be read or a study file that is wrong, 4 a study in which a run failed or a
+figure could not be drawn, 5 a file that cannot be written, 130 and 143 stopped by a signal.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from typing import Any, NoReturn
 
 import numpy as np
 
-from . import __version__, export, figures, measures
+from . import __version__, export, figures, measures, report, study
 from .animation import animate
 from .band import LEVEL, BandMeasure
 from .contours import contour_figure
@@ -507,6 +508,43 @@ def _animate(args: Arguments) -> None:
     ))  # fmt: skip
 
 
+def _add_study(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("file", metavar="FILE.toml", type=Path, help="study file")
+    parser.add_argument("--output", metavar="DIR", type=Path,
+                        help="folder for results (default: results/<its name>)")  # fmt: skip
+    parser.add_argument("--jobs", metavar="N", type=_count,
+                        help="runs at a time (default: as many as there are cores)")  # fmt: skip
+    parser.add_argument(
+        "--program", metavar="PATH", type=Path,
+        help="the program perigeo (default: PERIGEO_BIN, bin/perigeo above FILE, or on PATH)",
+    )  # fmt: skip
+    parser.add_argument("--only", metavar="RUN", nargs="+", default=[],
+                        help="make only these runs; patterns like 'm_*' are allowed")  # fmt: skip
+    how = parser.add_mutually_exclusive_group()
+    how.add_argument("--dry-run", action="store_true",
+                     help="check everything and say what would be run")  # fmt: skip
+    how.add_argument("--redo", action="store_true", help="make runs anew that are done already")
+    how.add_argument("--figures-only", action="store_true",
+                     help="run nothing; measure and draw what is there")  # fmt: skip
+
+
+def _count(text: str) -> int:
+    if not text.isdigit() or int(text) < 1:
+        raise argparse.ArgumentTypeError(f"'{text}' is not a whole number from 1 on")
+    return int(text)
+
+
+def _study(args: Arguments) -> int:
+    options = study.StudyOptions(
+        args.output, args.jobs, args.program, args.dry_run, args.redo, args.only, args.figures_only
+    )
+    try:
+        return study.run_study(args.file, options)
+    except study.Stopped as stopped:
+        print(f"perigeo-post: {stopped}", file=sys.stderr)
+        return stopped.exit_status
+
+
 # ---- the frame round the commands --------------------------------------------------------------
 
 
@@ -529,7 +567,8 @@ def _say(args: Arguments, path: Path) -> None:
 
 
 _Setup = Callable[[argparse.ArgumentParser], None]
-COMMANDS: dict[str, tuple[_Setup, Callable[[Arguments], None], str, str]] = {
+_Action = Callable[[Arguments], Any]  # gives the exit status; None: 0
+COMMANDS: dict[str, tuple[_Setup, _Action, str, str]] = {
     "info": (
         _add_info, _info, "what a result holds and how far it has come",
         """\
@@ -571,6 +610,20 @@ COMMANDS: dict[str, tuple[_Setup, Callable[[Arguments], None], str, str]] = {
         perigeo-post animate run.h5
         perigeo-post animate run.h5 --field von_mises --deformed 5 -o run.mp4""",
     ),
+    "study": (
+        _add_study, _study, "many runs from one file: what to vary, to measure and to draw",
+        """\
+        perigeo-post study studies/horizon.toml
+        perigeo-post study studies/horizon.toml --dry-run
+        perigeo-post study my_study.toml --output results/trial --only 'm_*' --jobs 1
+        perigeo-post study my_study.toml --figures-only""",
+    ),
+    "report": (
+        report.add_options, report.carry_out, "one page with all studies: results/report.html",
+        """        perigeo-post report
+        perigeo-post report --results results -o page.html
+        perigeo-post report --publish doc/verification.md""",
+    ),
 }  # fmt: skip
 
 
@@ -602,19 +655,20 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit status."""
     try:
         args = parser().parse_args(argv)
-        args.action(args)
+        status = args.action(args)
         sys.stdout.flush()
     except SystemExit as stop:
         return stop.code if isinstance(stop.code, int) else 1
     except PostError as error:
-        print(f"perigeo-post: error: {error}", file=sys.stderr)
+        for line in str(error).splitlines():
+            print(f"perigeo-post: error: {line}", file=sys.stderr)
         return error.exit_status
     except BrokenPipeError:  # the reader of a pipe has gone
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 1
     except KeyboardInterrupt:
         return 130
-    return 0
+    return status or 0
 
 
 def main_entry() -> NoReturn:

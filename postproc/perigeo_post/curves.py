@@ -9,7 +9,7 @@ import numpy as np
 
 from .errors import RequestError
 from .result import Run
-from .sampling import FloatArray
+from .sampling import BoolArray, FloatArray
 
 MODULUS_RANGE = (2.0e-4, 1.0e-3)  # nominal strain, between which the modulus is fitted
 ENERGIES = (
@@ -143,15 +143,9 @@ def apparent_modulus(
     taken from the input of the run.
     """
     curve = stress_strain(run)
-    ratio = nu if nu is not None else run.number("material.poissons_ratio")
-    if ratio is None:
-        raise RequestError(f"{run.path} does not say Poisson's ratio of its material")
+    ratio = poissons_ratio(run, nu)
     low, high = strain_range
-    size = np.abs(curve.x)
-    slack = 1e-9 * high
-    turned = np.flatnonzero(size > high + slack)
-    loading = np.arange(len(size)) < (turned[0] if len(turned) else len(size))
-    inside = loading & (size >= low - slack)
+    inside = first_loading(np.abs(curve.x), strain_range)
     rows = int(inside.sum())
     if rows < 3:
         raise RequestError(
@@ -160,6 +154,23 @@ def apparent_modulus(
         )
     slope = float(np.polyfit(curve.x[inside], curve.y[inside], 1)[0])
     return Modulus((1.0 - ratio**2) * slope, slope, ratio, rows, (low, high))
+
+
+def poissons_ratio(run: Run, nu: float | None = None) -> float:
+    """Poisson's ratio of the material, from the input of the run where none is given."""
+    ratio = nu if nu is not None else run.number("material.poissons_ratio")
+    if ratio is None:
+        raise RequestError(f"{run.path} does not say Poisson's ratio of its material")
+    return ratio
+
+
+def first_loading(strain: FloatArray, strain_range: tuple[float, float]) -> BoolArray:
+    """The rows with a strain (in magnitude) in the range, before it is first exceeded."""
+    low, high = strain_range
+    slack = 1e-9 * high
+    turned = np.flatnonzero(strain > high + slack)
+    loading = np.arange(len(strain)) < (turned[0] if len(turned) else len(strain))
+    return np.asarray(loading & (strain >= low - slack))
 
 
 def curve_numbers(

@@ -13,11 +13,11 @@ from .band import (
     BandSystem,
     Line,
     Profile,
-    find_bands,
     line_across,
     profile_along,
     profile_width,
 )
+from .band_search import find_bands, search_scale
 from .curves import curve_numbers, modulus_numbers, peak, stress_strain
 from .errors import FieldNotFoundError, PostError, RequestError
 from .result import Frame, Run
@@ -66,12 +66,14 @@ def measure_band(
     if not 0.0 < level < 1.0:
         raise RequestError(f"the level must lie between 0 and 1, not {level:g}")
     bands = frame_bands(frame, axis, level)
+    near = None
     if line is None:
         line = line_across(
             bands.prevailing, run.body_points, bands.axis, normal, (run.lower, run.upper)
         )
+        near = (bands.prevailing.probe, 1.5 * search_scale(run.body_points, run.horizon))
     profile = frame_profile(frame, line)
-    width = profile_width(profile, run.body_points.spacing, level)
+    width = profile_width(profile, run.body_points.spacing, level, near)
     return BandMeasure(
         label=run.name,
         frame=frame.number,

@@ -115,7 +115,15 @@ def write_result(
         file.attrs["n_frames"] = np.int32(planned or len(states))
         file["input/namelist"] = np.bytes_(NAMELIST)
         file["input/values"] = np.array(
-            [b"run.title = 'made up'   ", b"material.poissons_ratio = 0.3"]
+            [
+                b"run.title = 'made up'",
+                b"material.poissons_ratio = 0.3",
+                b"material.youngs_modulus = 5.0e7",
+                b"material.density = 2000.0",
+                b"integration.damping_frame = platens",
+                b"boundary(bottom).contact = rough",
+                b"boundary(top).contact = smooth",
+            ]
         )
         _dataset(file, "points/position", points, "m", "reference position", "x y")
         _dataset(file, "points/volume", np.full(n, volume or spacing**2), "m^2", "volume", "")
@@ -164,6 +172,14 @@ def add_yield_stress(path: Path) -> np.ndarray:
         values = 1e5 + np.arange(len(file["points/volume"]), dtype=float)
         _dataset(file, "points/yield_stress", values, "Pa", "initial yield stress", "")
     return values
+
+
+def write_columns(path: Path, columns: dict[str, np.ndarray]) -> Path:
+    """A history with these columns."""
+    rows = np.column_stack(list(columns.values()))
+    lines = [",".join(columns), *(",".join(f"{v:.12g}" for v in row) for row in rows)]
+    path.write_text("\n".join(lines) + "\n")
+    return path
 
 
 def write_history(path: Path, modulus: float = 50e6, nu: float = 0.3, rows: int = 400) -> Path:

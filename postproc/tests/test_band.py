@@ -132,6 +132,34 @@ def test_both_bands_of_an_x_are_measured_away_from_their_crossing(
     assert width.peak == pytest.approx(max(strong, weak), rel=0.05)
 
 
+def test_the_profile_avoids_the_crossing_with_a_third_band() -> None:
+    """Four bands round a diamond, as between two platens that are alike."""
+    points = PointSet(body(), None, DX)
+    alpha = sum(
+        synthetic.gaussian_band(points.points, (0.5, y), 45.0, rising, SIGMA, peak)
+        for y, rising, peak in (
+            (0.7, True, 0.10), (1.3, True, 0.12), (0.7, False, 0.11), (1.3, False, 0.10),
+        )
+    )  # fmt: skip
+    bands, width = measured(points, alpha)
+    assert width.closed
+    assert width.width == pytest.approx(FULL_WIDTH, abs=1.5 * DX)
+    assert bands.prevailing.width_median == pytest.approx(FULL_WIDTH, abs=1.5 * DX)
+
+
+def test_the_peak_is_looked_for_near_a_place() -> None:
+    points = PointSet(body(), None, DX)
+    alpha = synthetic.gaussian_band(points.points, (0.5, 0.5), 45.0, True, SIGMA, 0.1)
+    alpha += synthetic.gaussian_band(points.points, (0.5, 1.3), 45.0, True, SIGMA, 0.2)
+    profile = profile_along(points, alpha, ((0.5, 0.0), (0.5, 2.0)))
+    assert profile_width(profile, DX).peak_distance == pytest.approx(1.3, abs=DX)
+    near = profile_width(profile, DX, near=((0.5, 0.5), 0.2))
+    assert near.peak_distance == pytest.approx(0.5, abs=DX)
+    assert near.width == pytest.approx(np.sqrt(2.0) * FULL_WIDTH, abs=DX)
+    with pytest.raises(NoBandError):
+        profile_width(profile, DX, near=((5.0, 0.5), 0.2))
+
+
 def test_noise_moves_the_measures_little() -> None:
     points = PointSet(body(), None, DX)
     random = np.random.default_rng(7)

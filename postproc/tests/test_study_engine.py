@@ -1,0 +1,389 @@
+"""Parts of the engine of studies: expressions, namelists, findings, progress, the program."""
+
+from __future__ import annotations
+
+import io
+import math
+import os
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from perigeo_post.errors import RequestError
+from perigeo_post.study_expressions import (
+    TABLE_FUNCTIONS,
+    Expression,
+    ExpressionError,
+    MissingValueError,
+    Numbers,
+)
+from perigeo_post.study_findings import Finding, TableRow, evaluate
+from perigeo_post.study_jobs import Job, Record
+from perigeo_post.study_namelist import NamelistError, file_names, parse_namelist
+from perigeo_post.study_program import Check, find_program, message_of, read_check
+from perigeo_post.study_progress import Progress, duration, steps_done
+from perigeo_post.study_runner import weight
+
+# ---- expressions -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("m", 4),
+        ("0.08 / m", 0.02),
+        ("-m + 2 * 3 ** 2 // 4 % 3", -3),
+        ("+m", 4),
+        ("round(0.08 / 3, 3)", 0.027),
+        ("round(2.5 * m)", 10),
+        ("max(1, m, 2) - min([3, m])", 1),
+        ("sqrt(m) + abs(-1) + floor(1.7) + ceil(1.2) + int(2.9)", 8.0),
+        ("pi", math.pi),
+        ("1 < m <= 4", True),
+        ("not m == 4 or m != 4", False),
+        ("0 and m", 0),
+        ("'rough' if name == 'a' else 'smooth'", "rough"),
+        ("name in ['a', 'b'] and name not in ('c',)", True),
+        ("[m, 2 * m][-1]", 8),
+        ("1e3", 1000.0),
+        ("  m  ", 4),
+    ],
+)
+def test_expressions_have_the_values_of_arithmetic(text: str, value: object) -> None:
+    found = Expression(text).value({"m": 4, "name": "a"})
+    assert found == (pytest.approx(value) if isinstance(value, float) else value)
+    assert type(found) is type(value)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "no expression"),
+        ("1 +", "no expression"),
+        ("a b", "no expression"),
+        ("m.real", "not allowed in an expression: Attribute"),
+        ("().__class__", "Attribute"),
+        ("[x for x in [1]]", "ListComp"),
+        ("lambda: 1", "Lambda"),
+        ("(y := 1)", "NamedExpr"),
+        ("f'{m}'", "JoinedStr"),
+        ("m[0:1]", "Slice"),
+        ("{1: 2}", "Dict"),
+        ("1j", "not allowed in an expression: 1j"),
+        ("b'a'", "not allowed"),
+        ("max(*[1])", "Starred"),
+        ("max(**a)", "only plain calls"),
+        ("max(1)(2)", "only plain calls"),
+        ("__import__('os')", "unknown function __import__"),
+        ("maxx(1)", "unknown function maxx, did you mean 'max'?"),
+        ("n", "unknown name n"),
+        ("max", "unknown name max"),
+        ("m / 0", "division by zero"),
+        ("0.0 ** -1", "division by zero"),
+        ("m % 0", "division by zero"),
+        ("9 ** 9 ** 9", "a power is too large"),
+        ("10.0 ** 400", "a number is too large"),
+        ("1e308 * 10", "no finite number"),
+        ("(-8) ** 0.5", "is no real number"),
+        ("'a' * 1000", "'a' is no number"),
+        ("'a' + 'b'", "'a' is no number"),
+        ("[1] + [2]", "is no number"),
+        ("sqrt(-1)", "'sqrt(-1)'"),
+        ("sqrt('a')", "'sqrt"),
+        ("1 < 'a'", "'1 < 'a''"),
+        ("max([])", "there are no values"),
+        ("m['a']", "only a whole number"),
+        ("[1][1]", "there is no value number 1"),
+        ("m[0]", "a list is needed"),
+        ("(" * 500 + "1" + ")" * 500, "no expression"),
+        ("-" * 1500 + "1", "expression"),
+        ("1" * 2001, "more than 2000 characters"),
+    ],
+)
+def test_what_is_not_arithmetic_is_refused(text: str, message: str) -> None:
+    with pytest.raises(RequestError) as caught:
+        Expression(text).value({"m": 4})
+    assert message in str(caught.value)
+
+
+def table_value(text: str, **names: Any) -> Any:
+    return Expression(text).value(names, TABLE_FUNCTIONS)
+
+
+def test_columns_are_joined_run_by_run() -> None:
+    width = Numbers({"a": 2.0, "b": 6.0, "c": 5.0})
+    delta = Numbers({"c": 1.0, "a": 1.0})
+    assert table_value("w / d", w=width, d=delta).by_run == {"a": 2.0, "c": 5.0}
+    assert table_value("(2 * w - 1)[1]", w=width) == 11.0
+    assert table_value("all(1 < w < 7)", w=width) is True
+    assert table_value("all(w < d)", w=width, d=delta) is False
+    assert table_value("ratio(w) + mean(w) + median(w) + len(w) + sum(w)", w=width) == (
+        pytest.approx(3 + 13 / 3 + 5 + 3 + 13)
+    )
+    assert table_value("sorted(w)", w=width) == [2.0, 5.0, 6.0]
+    assert table_value("abs(-w)[0]", w=width) == 2.0
+    assert table_value("slope([1, 2, 3], [2, 4, 6])") == pytest.approx(2.0)
+    assert table_value("slope(d, w)", w=width, d=Numbers({"a": 0.0, "c": 2.0})) == 1.5
+    with pytest.raises(MissingValueError, match="no run in common"):
+        table_value("w / d", w=width, d=Numbers({"x": 1.0}))
+    with pytest.raises(MissingValueError, match="two different x"):
+        table_value("slope([1, 1], [2, 3])")
+    with pytest.raises(ExpressionError, match="needs values above 0"):
+        table_value("ratio([0, 1])")
+
+
+# ---- findings --------------------------------------------------------------------------------
+
+
+def finding(values: dict[str, str], found: str, *holds: str) -> Finding:
+    return Finding(
+        title="Title",
+        paper="Paper",
+        found=found,
+        note="Note",
+        values={name: Expression(text) for name, text in values.items()},
+        holds=tuple(Expression(text) for text in holds),
+    )
+
+
+ROWS = [
+    TableRow(f"{s}{m}", f"m = {m}", s, {"m": m, "t": s}, {"m": m, "w": w, "n": None})
+    for s, m, w in [("a", 1, 3.0), ("a", 2, 2.0), ("b", 1, 5.0), ("b", 2, math.nan)]
+]
+
+
+def test_a_finding_compares_numbers_of_the_table() -> None:
+    one = finding(
+        {"most": "max(col('w', series='a'))", "b": "val('w', series='b', m=1)", "all": "col('w')"},
+        "{most:.1f} and {b:g}, {all}",
+        "most < b", "most > 2", "len(col('w', m=[1, 3])) == 2", "all > 1",
+        "val('w', run='a2') == 2",
+    )  # fmt: skip
+    assert evaluate(one, ROWS) == {
+        "title": "Title",
+        "paper": "Paper",
+        "found": "3.0 and 5, [3.0, 2.0, 5.0]",
+        "verdict": "agrees",
+        "note": "Note",
+        "values": {"most": 3.0, "b": 5.0, "all": [3.0, 2.0, 5.0]},
+        "holds": [[test.text, True] for test in one.holds],
+    }
+
+
+@pytest.mark.parametrize(
+    ("holds", "verdict"),
+    [
+        (["w > 2", "w < 4"], "agrees"),
+        (["w > 2", "w > 4"], "agrees in part"),
+        (["w > 4"], "differs"),
+        (["col('w') > 2.5"], "differs"),
+        (["w > 2", "max(col('n')) > 1"], "no result"),
+        (["val('w', series='b', m=2) > 1"], "no result"),
+        (["val('w', m=1) > 1"], "no result"),
+    ],
+)
+def test_the_verdict_follows_from_the_tests(holds: list[str], verdict: str) -> None:
+    found = evaluate(finding({"w": "val('w', series='a', m=1)"}, "{w}", *holds), ROWS)
+    assert found["verdict"] == verdict
+    assert found["found"].startswith("no result: " if verdict == "no result" else "3.0")
+
+
+def test_numbers_that_are_missing_are_no_result() -> None:
+    found = evaluate(finding({"n": "max(col('n'))"}, "{n:.1f}", "n > 1"), ROWS)
+    assert found["verdict"] == "no result"
+    assert "no run has a 'n'" in found["found"]
+    assert found["holds"] == []
+    assert evaluate(finding({"n": "'text'"}, "{n:.1f}", "1 > 0"), ROWS)["verdict"] == "no result"
+
+
+# ---- namelists -------------------------------------------------------------------------------
+
+NAMELIST = """\
+! comment with a ' and a /
+&RUN Title = 'it''s a / "title"', name="n" /  ! done
+&body file='points.txt'
+  x_max = 3*1.0d-1 2.0, , vertices = 0.0
+  1.0 /
+&output frame_strains = 2*0.5, 1d-2, history_count=100/
+"""
+
+
+def test_a_namelist_is_taken_apart_as_the_program_does() -> None:
+    found = parse_namelist(NAMELIST)
+    assert [group.name for group in found.groups] == ["run", "body", "output"]
+    assert found.groups[0].entries == {"title": ["'it''s a / \"title\"'"], "name": ['"n"']}
+    assert found.groups[0].label == "n"
+    assert found.groups[1].entries["x_max"] == ["3*1.0d-1", "2.0"]
+    assert found.groups[1].entries["vertices"] == ["0.0", "1.0"]
+    assert found.numbers("output", "frame_strains") == [0.5, 0.5, 0.01]
+    assert found.numbers("output", "nothing") == []
+    assert found.numbers("run", "name") == []
+    assert file_names(found) == [(found.groups[1], "points.txt")]
+    assert parse_namelist(found.text()).text() == found.text()
+    assert parse_namelist("\ufeff&run /\r\n! end").text() == "&run\n/\n"
+
+
+def test_changes_find_groups_by_name_or_number() -> None:
+    found = parse_namelist("&boundary name = 'top' /\n&run /\n&boundary name = 'left' /\n")
+    found.change("boundary.LEFT.side", "it's")
+    found.change("boundary.1.side", "top")
+    found.change("boundary.right.velocity", [0, 1.5])
+    found.change("output.flag", True)
+    assert found.text() == (
+        "&boundary\n  name = 'top'\n  side = 'top'\n/\n&run\n/\n"
+        "&boundary\n  name = 'left'\n  side = 'it''s'\n/\n"
+        "&boundary\n  name = 'right'\n  velocity = 0, 1.5\n/\n"
+        "&output\n  flag = .true.\n/\n"
+    )
+    found.change("boundary.top", False)
+    found.change("boundary.right.velocity", "unset")
+    assert [group.label for group in found.named("boundary")] == ["left", "right"]
+    found.change("boundary", False)
+    assert not found.named("boundary")
+    with pytest.raises(NamelistError, match="on one line"):
+        found.change("run.title", "a\nb")
+
+
+# ---- the program -----------------------------------------------------------------------------
+
+CHECKED = """\
+a.nml: the input is right
+  title               steps 3 to 4 points
+  points              5559, of which fictitious 408
+  bonds               1.2345E+07; per point 45.717 on average, 16 at least
+  steps               9154 to 3.2 s
+  run time            about 2.5 min, threads: 1
+"""
+
+
+def test_the_figures_of_a_check_are_read() -> None:
+    assert read_check(CHECKED) == Check(5559, 9154, 1.2345e7, 150.0)
+    assert read_check("nothing") is None
+    assert weight(Check(100, 10, 1000.0, 0.0)) == pytest.approx(40000.0)
+
+
+def test_messages_of_the_program_lose_its_name_and_paths() -> None:
+    text = "perigeo: error: a/b.nml, line 2, &body x: wrong\nperigeo: error: a/b.nml: missing\n\n"
+    assert message_of(text, ["a/b.nml"]) == "line 2, &body x: wrong; missing"
+    assert message_of("\n".join(f"line {k}" for k in range(9))).endswith("line 4; and 4 more")
+
+
+def program_at(path: Path, version: str) -> Path:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(f"#!/bin/sh\necho '{version}'\n")
+    path.chmod(0o755)
+    return path
+
+
+def test_the_program_is_found_above_the_study_or_on_path(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delenv("PERIGEO_BIN", raising=False)
+    monkeypatch.setenv("PATH", f"{tmp_path / 'path'}:/usr/bin:/bin")
+    study = tmp_path / "project" / "studies" / "a.toml"
+    with pytest.raises(RequestError, match="is not there: neither"):
+        find_program(None, study)
+    program_at(tmp_path / "path" / "perigeo", "perigeo 1 (a)")
+    assert find_program(None, study).version == "perigeo 1 (a)"
+    program_at(tmp_path / "project" / "bin" / "perigeo", "perigeo 2 (a)")
+    assert find_program(None, study).version == "perigeo 2 (a)"
+    third = program_at(tmp_path / "third", "perigeo 3 (a)")
+    monkeypatch.setenv("PERIGEO_BIN", str(third))
+    assert find_program(None, study).version == "perigeo 3 (a)"
+    fourth = program_at(tmp_path / "fourth", "perigeo 4 (unknown)")
+    found = find_program(fourth, study)
+    assert found.version == "perigeo 4 (unknown)"
+    assert found.identity.startswith("perigeo 4 (unknown), sha256 ")
+    monkeypatch.setenv("PERIGEO_BIN", str(tmp_path / "gone"))
+    with pytest.raises(RequestError, match=r"gone \(PERIGEO_BIN\)"):
+        find_program(None, study)
+    with pytest.raises(RequestError, match="is not perigeo: its --version says 'ls'"):
+        find_program(program_at(tmp_path / "ls", "ls"), study)
+
+
+# ---- progress --------------------------------------------------------------------------------
+
+
+class Screen(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+def a_job(folder: Path, name: str, status: str, work: float, seconds: float = 0.0) -> Job:
+    job = Job(name, folder / name, "", "", {}, status=status, weight=work)
+    job.record = Record("", "", "", "", status, seconds=seconds)
+    job.fraction = 1.0 if status == "done" else 0.0
+    return job
+
+
+def test_progress_weighs_runs_by_their_work(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setenv("COLUMNS", "120")
+    now = [1000.0]
+    monkeypatch.setattr("time.monotonic", lambda: now[0])
+    monkeypatch.setattr("time.time", lambda: 2e9)
+    screen = Screen()
+    progress = Progress("trial", screen, 2)
+    running = a_job(tmp_path, "b", "running", 40.0)
+    running.started = 996.0
+    running.folder.mkdir()
+    log = running.folder / "b.log"
+    log.write_text("step 10/100 (10 %)\nstep 20/100 (20 %)  time\n")
+    os.utime(log, (2e9 - 1.0, 2e9 - 1.0))
+    jobs = [
+        a_job(tmp_path, "a", "done", 20.0, 11.0),
+        running,
+        a_job(tmp_path, "c", "waiting", 40.0),
+    ]
+    progress.running(jobs)
+    # 28 of 100 done; half a second for each of 72 left, on two cores, but 40 of them in one run.
+    assert "\rtrial [######..................]  28 %  1 of 3 runs  about 20 s left" in (
+        screen.getvalue()
+    )
+    shown = len(screen.getvalue())
+    now[0] += 0.1
+    progress.running(jobs)
+    assert len(screen.getvalue()) == shown
+    progress.clear()
+    assert screen.getvalue().endswith("\r\x1b[K")
+
+
+def test_progress_without_a_terminal_is_plain_lines(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now = [1000.0]
+    monkeypatch.setattr("time.monotonic", lambda: now[0])
+    stream = io.StringIO()
+    progress = Progress("trial", stream, 2)
+    jobs = [a_job(tmp_path, "a", "done", 1.0, 61.0), a_job(tmp_path, "b", "waiting", 1.0)]
+    progress.running(jobs)
+    now[0] += 20.0
+    progress.running(jobs)
+    assert stream.getvalue() == ""
+    progress.ended(jobs[0])
+    now[0] += 11.0
+    progress.running(jobs)
+    lines = stream.getvalue().splitlines()
+    assert lines[0] == "trial: a done after 1 min 01 s"
+    assert lines[1].endswith(" 50 %  1 of 2 runs  about 1 min 01 s left")
+    assert "\x1b" not in stream.getvalue()
+    assert "\r" not in stream.getvalue()
+
+
+def test_times_are_given_in_words(tmp_path: Path) -> None:
+    assert [duration(s) for s in (0.2, 59.6, 3599, 3660)] == [
+        "0 s", "1 min 00 s", "59 min 59 s", "1 h 01 min",
+    ]  # fmt: skip
+    assert steps_done(tmp_path / "nothing.log") == (0.0, 0.0)
+
+
+def test_the_records_of_runs_survive_what_is_no_record(tmp_path: Path) -> None:
+    job = a_job(tmp_path, "a", "running", 1.0)
+    job.keep(message="ä")
+    assert job.read_record() == job.record
+    for text in ("", "{}", "[1]", '{"identity": 1, "other": 2}'):
+        job.record_path.write_text(text)
+        assert job.read_record() is None

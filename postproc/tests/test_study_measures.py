@@ -1,0 +1,117 @@
+"""The groups of columns that a study measures."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from perigeo_post import Run
+from perigeo_post.study_measures import MEASURES, line_meeting
+from perigeo_post.study_types import State, Value
+
+AT_ONE = State(0.01)
+PAPER = ((0.0, 0.5), (1.0, 1.5))
+
+
+def take(path: Path, group: str, state: State = AT_ONE) -> dict[str, Value]:
+    return MEASURES[group].take(Run(path), state)
+
+
+@pytest.mark.parametrize("group", sorted(MEASURES))
+@pytest.mark.parametrize("kind", ["result", "cut_off", "failed", "cloud"])
+@pytest.mark.parametrize("state", [State(), AT_ONE, State(0.5)])
+def test_every_column_is_there_and_nothing_is_raised(
+    group: str, kind: str, state: State, request: pytest.FixtureRequest
+) -> None:
+    found = take(request.getfixturevalue(kind), group, state)
+    assert list(found) == list(MEASURES[group].columns)
+    for value in found.values():
+        assert value is None or isinstance(value, (bool, str)) or np.isfinite(value)
+
+
+def test_columns_have_units_and_sentences_and_one_group_each() -> None:
+    names = [name for measure in MEASURES.values() for name in measure.columns]
+    assert len(names) == len(set(names))
+    for measure in MEASURES.values():
+        for column in measure.columns.values():
+            assert column.unit
+            assert column.description[-1] != "."
+
+
+def test_the_curve_and_its_state(result: Path) -> None:
+    found = take(result, "curve")
+    assert found["peak_stress"] == pytest.approx(50e6 / 0.91 * 0.0034, rel=0.01)
+    assert found["strain_at_peak"] == pytest.approx(0.0034, abs=5e-5)
+    assert found["state_strain"] == 0.01
+    top = 50e6 / 0.91 * 0.0034
+    assert found["stress_at_state"] == pytest.approx(top - 2e7 * 0.0066, rel=0.01)
+    assert found["last_stress"] == pytest.approx(3e4)
+    assert found["largest_alpha"] == pytest.approx(0.7 * 0.3, rel=0.05)
+    assert take(result, "curve", State())["state_strain"] == 0.016
+
+
+def test_the_moduli_that_a_run_has(result: Path) -> None:
+    found = take(result, "modulus")
+    assert found["modulus_platen"] == pytest.approx(50e6)
+    assert found["modulus_gauge"] is None  # there are no frames in the range
+    assert found["modulus_mean"] == pytest.approx(0.91 * 50e6 / 0.91)
+    assert found["modulus_target"] == 50e6
+
+
+def test_the_band_and_its_pattern(result: Path) -> None:
+    found = take(result, "band")
+    width, uncertainty = found["width"], found["width_uncertainty"]
+    assert width == pytest.approx(2 * 0.05 * np.sqrt(2 * np.log(10)), abs=0.03)
+    assert uncertainty == 0.04
+    assert found["width_over_horizon"] == pytest.approx(float(str(width)) / 0.12)
+    assert found["width_over_horizon_uncertainty"] == pytest.approx(0.04 / 0.12)
+    assert found["width_closed"] is True
+    assert (found["direction"], found["pattern"]) == ("rising", "X")
+    assert found["band_ratio"] == pytest.approx(0.5, abs=0.03)
+    assert found["profile_mirrored"] is False
+
+
+def test_the_line_of_the_paper_is_mirrored_to_cross_the_band(result: Path) -> None:
+    """The prevailing band rises, as the line does, so the line must fall."""
+    found = take(result, "band", State(0.01, PAPER))
+    assert found["profile_mirrored"] is True
+    assert found["peak_alpha"] == pytest.approx(0.7 * 0.2, rel=0.1)
+    run = Run(result)
+    assert line_meeting(PAPER, run, ((0.0, 0.0), (1.0, 1.0))) == (((1.0, 0.5), (0.0, 1.5)), True)
+    assert line_meeting(PAPER, run, ((0.0, 1.0), (1.0, 0.0))) == (PAPER, False)
+
+
+def test_the_quality_of_a_run(result: Path) -> None:
+    found = take(result, "quality")
+    assert found["reaction_gap_largest"] == pytest.approx(0.01 / 1.01, rel=1e-6)
+    assert found["energy_error_largest"] == pytest.approx(1e-5)
+    assert found["zero_energy_largest"] == pytest.approx(1e-3)
+
+
+def test_the_softening_branch_and_what_it_dissipates(result: Path) -> None:
+    found = take(result, "softening")
+    assert found["softening_slope"] == pytest.approx(2e7, rel=0.01)
+    assert found["brittleness"] == pytest.approx(2e7 / (50e6 / 0.91), rel=0.01)
+    assert found["dissipated_energy"] == pytest.approx(5.0)
+    area = Run(result).volumes[Run(result).body].sum()
+    assert found["dissipated_density"] == pytest.approx(5.0 / area)
+    assert found["stress_0_5"] == pytest.approx(50e6 / 0.91 * 0.0034 - 2e7 * 0.0016, rel=0.01)
+    assert found["approach_velocity"] == pytest.approx(0.01)
+
+
+def test_a_field_of_the_yield_stress_is_described(result: Path) -> None:
+    assert set(take(result, "field").values()) == {None}
+    run = Run(result)
+    inside = np.flatnonzero(run.body)
+    values = np.full(len(run.body), 9e9)  # fictitious points do not count
+    values[inside] = np.where(np.arange(len(inside)) % 2 == 0, 1.2e5, 1.8e5)
+    with h5py.File(result, "r+") as file:
+        file["points/yield_stress"] = values
+    found = take(result, "field")
+    assert found["yield_stress_mean"] == pytest.approx(1.5e5, rel=1e-3)
+    assert found["yield_stress_variation"] == pytest.approx(0.2, rel=1e-2)
+    assert found["yield_stress_least"] == 1.2e5
+    assert found["yield_stress_band"] == pytest.approx(1.5e5, rel=0.05)
