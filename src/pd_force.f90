@@ -120,7 +120,6 @@ contains
     real(wp),      intent(out)   :: dissipated
     integer,       intent(out)   :: failed
     real(wp) :: strain(n_block, 4)
-    integer  :: i
 
     dissipated = 0.0_wp
     failed = first_inverted(lo, hi, state%deformation_gradient)
@@ -129,10 +128,8 @@ contains
     call stress_block(solid%material, lo, hi, solid%yield_stress, volume, strain, state, &
       dissipated)
     call force_state_block(lo, hi, state%deformation_gradient, state%stress, solid%k_inverse, a)
-    if (.not. allocated(solid%control)) return
-    do i = lo, hi
-      call subtract_affine_control(solid%control(i), state%deformation_gradient(i, :), a(i, :))
-    end do
+    if (allocated(solid%control)) &
+      call subtract_affine_control(lo, hi, solid%control, state%deformation_gradient, a)
   end subroutine force_state_of_block
 
   !> The first of the points lo to hi whose det F is not positive (NaN included); 0: none.
@@ -153,14 +150,21 @@ contains
     end do
   end function first_inverted
 
-  !> A <- A - c (F - I).
-  pure subroutine subtract_affine_control(c, f, a)
-    real(wp), intent(in)    :: c, f(4)
-    real(wp), intent(inout) :: a(4)
+  !> A <- A - c (F - I) for points lo to hi.
+  pure subroutine subtract_affine_control(lo, hi, c, f, a)
+    integer,  intent(in) :: lo, hi
+    real(wp), intent(in),    contiguous :: c(:)      !! (n) [N/m^6]
+    real(wp), intent(in),    contiguous :: f(:, :)   !! F (n,4) xx xy yx yy
+    real(wp), intent(inout), contiguous :: a(:, :)   !! A (n,4) xx xy yx yy [N/m^6]
+    integer :: i
 
-    a = a - c * f
-    a(1) = a(1) + c
-    a(4) = a(4) + c
+    !$omp simd simdlen(8)
+    do i = lo, hi
+      a(i, 1) = a(i, 1) - c(i) * (f(i, 1) - 1.0_wp)
+      a(i, 2) = a(i, 2) - c(i) * f(i, 2)
+      a(i, 3) = a(i, 3) - c(i) * f(i, 3)
+      a(i, 4) = a(i, 4) - c(i) * (f(i, 4) - 1.0_wp)
+    end do
   end subroutine subtract_affine_control
 
   !> Internal force of a small displacement of the unloaded elastic body: the linearised
@@ -201,7 +205,7 @@ contains
     call small_strain_block(lo, hi, f, strain)
     call elastic_stress_block(solid%material, hi - lo + 1, strain, stress)
     associate (k => solid%k_inverse)
-      !$omp simd private(b)
+      !$omp simd simdlen(8) private(b)
       do i = lo, hi
         b = i - lo + 1
         a(i, 1) = stress(b, 1) * k(i, 1) + stress(b, 4) * k(i, 3)
@@ -210,10 +214,7 @@ contains
         a(i, 4) = stress(b, 4) * k(i, 3) + stress(b, 2) * k(i, 2)
       end do
     end associate
-    if (.not. allocated(solid%control)) return
-    do i = lo, hi
-      call subtract_affine_control(solid%control(i), f(i, :), a(i, :))
-    end do
+    if (allocated(solid%control)) call subtract_affine_control(lo, hi, solid%control, f, a)
   end subroutine linear_force_state_block
 
 end module pd_force

@@ -142,7 +142,7 @@ contains
       values(1, :) = self%plastic_strain
     case ('von_mises')
       values(1, :) = self%von_mises
-    case ('zero_energy')
+    case default
       values(1, :) = self%zero_energy
     end select
   end subroutine one_of_fields

@@ -90,23 +90,25 @@ contains
     type(history_t),     intent(inout) :: history
     type(history_row_t), intent(in)    :: row
     type(error_list_t),  intent(inout) :: errors
-    character(:), allocatable :: line
+    real(wp) :: numbers(13 + 2 * size(row%force, 1))
     character(12) :: step
-    integer :: k
+    integer :: n, k
 
-    write (step, '(i0)') row%step
-    line = trim(step)//','//number(row%time)
-    if (history%has_strain) line = line//','//number(row%strain)
+    numbers(1) = row%time
+    n = 1
+    if (history%has_strain) then
+      n = 2
+      numbers(2) = row%strain
+    end if
     do k = 1, size(row%force, 1)
-      line = line//','//number(row%force(k, 1))//','//number(row%force(k, 2))
+      numbers(n + 1:n + 2) = row%force(k, :)
+      n = n + 2
     end do
-    line = line//','//number(row%mean_stress_xx)//','//number(row%mean_stress_yy)//',' &
-      //number(row%mean_strain_yy)//','//number(row%max_plastic_strain)//',' &
-      //number(row%kinetic_energy)//','//number(row%strain_energy)//',' &
-      //number(row%plastic_dissipation)//','//number(row%damping_dissipation)//',' &
-      //number(row%stabilisation_energy)//','//number(row%external_work)//',' &
-      //number(row%energy_error)
-    call write_line(history%file, line, errors)
+    numbers(n + 1:n + 11) = [row%mean_stress_xx, row%mean_stress_yy, row%mean_strain_yy, &
+      row%max_plastic_strain, row%kinetic_energy, row%strain_energy, row%plastic_dissipation, &
+      row%damping_dissipation, row%stabilisation_energy, row%external_work, row%energy_error]
+    write (step, '(i0)') row%step
+    call write_line(history%file, trim(step)//comma_separated(numbers(:n + 11)), errors)
     call flush_output(history%file, errors)
     if (history%file%is_open()) history%rows = history%rows + 1
   end subroutine write_row
@@ -193,14 +195,25 @@ contains
       //'stabilisation_energy,external_work,energy_error'
   end function header
 
-  !> A number with 17 significant digits.
-  pure function number(x) result(text)
-    real(wp), intent(in) :: x
+  !> Numbers with 17 significant digits, each after a comma.
+  pure function comma_separated(numbers) result(text)
+    real(wp), intent(in) :: numbers(:)
     character(:), allocatable :: text
-    character(24) :: buffer
+    integer, parameter :: width = 24   !! of a number with its sign
+    character(width * size(numbers)) :: cells
+    character((width + 1) * size(numbers)) :: line
+    integer :: k, first, length
 
-    write (buffer, '(es24.16e3)') x
-    text = trim(adjustl(buffer))
-  end function number
+    write (cells, '(*(es24.16e3))') numbers
+    length = 0
+    do k = 1, size(numbers)
+      first = width * (k - 1) + 1
+      if (cells(first:first) == ' ') first = first + 1
+      line(length + 1:length + 1) = ','
+      line(length + 2:length + 2 + width * k - first) = cells(first:width * k)
+      length = length + 2 + width * k - first
+    end do
+    text = line(:length)
+  end function comma_separated
 
 end module pd_history

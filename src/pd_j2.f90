@@ -78,7 +78,7 @@ contains
 
     g2 = 2.0_wp * material%shear_modulus
     lambda = material%lambda
-    !$omp simd private(pressure_part)
+    !$omp simd simdlen(8) private(pressure_part)
     do i = 1, n
       pressure_part = lambda * (strain(i, 1) + strain(i, 2) + strain(i, 3))
       stress(i, 1) = g2 * strain(i, 1) + pressure_part
@@ -111,7 +111,7 @@ contains
 
     over_4g = 0.25_wp / material%shear_modulus
     share = material%lambda / (3.0_wp * material%lambda + 2.0_wp * material%shear_modulus)
-    !$omp simd private(trace)
+    !$omp simd simdlen(8) private(trace)
     do i = lo, hi
       trace = stress(i, 1) + stress(i, 2) + stress(i, 3)
       energy(i - lo + 1) = over_4g * (stress(i, 1)**2 + stress(i, 2)**2 + stress(i, 3)**2 &
@@ -195,7 +195,7 @@ contains
     real(wp) :: mean, exx, eyy, ezz, exy, length
     integer  :: i
 
-    !$omp simd private(mean, exx, eyy, ezz, exy, length)
+    !$omp simd simdlen(8) private(mean, exx, eyy, ezz, exy, length)
     do i = 1, n
       mean = (points%stress(i, 1) + points%stress(i, 2) + points%stress(i, 3)) / 3.0_wp
       s(i, 1) = points%stress(i, 1) - mean
@@ -250,8 +250,8 @@ contains
     square_or_tiny = merge(square, tiny_modulus, square > 0.0_wp)
     no_bound = merge(0.0_wp, far, h > 0.0_wp)
     edge = merge(no_bound, far, square > 0.0_wp)
-    !$omp simd private(strength, r, f, room, bb, bn, linear, rest, reach, over, under, left) &
-    !$omp private(lowest)
+    !$omp simd simdlen(8) private(strength, r, f, room, bb, bn, linear, rest, reach, over, under) &
+    !$omp private(left, lowest)
     do i = 1, n
       lowest = min(floor_strength, points%yield_stress(i))
       strength = max(lowest, points%yield_stress(i) + hi * points%alpha(i))
@@ -292,7 +292,7 @@ contains
     factor = root_2_3 * material%kinematic_modulus
     softens = material%kinematic_modulus < 0.0_wp
     do c = 1, 4
-      !$omp simd private(way)
+      !$omp simd simdlen(8) private(way)
       do i = 1, n
         way = factor * merge(first(i), da(i), softens)
         points%back_stress(i, c) = points%back_stress(i, c) + way * flow(i, c)
@@ -312,14 +312,14 @@ contains
     hi = material%isotropic_modulus
     floor_strength = merge(material%residual_strength, -huge(1.0_wp), hi < 0.0_wp)
     g2 = 2.0_wp * material%shear_modulus
-    !$omp simd
+    !$omp simd simdlen(8)
     do i = 1, n
       points%alpha(i) = points%alpha(i) + da(i)
       radius(i) = root_2_3 * max(min(floor_strength, points%yield_stress(i)), &
         points%yield_stress(i) + hi * points%alpha(i))
     end do
     do c = 1, 4
-      !$omp simd private(back)
+      !$omp simd simdlen(8) private(back)
       do i = 1, n
         back = deviator_trial(i, c) - (points%back_stress(i, c) + radius(i) * flow(i, c))
         points%plastic_strain(i, c) = points%plastic_strain(i, c) + back / g2
@@ -431,7 +431,7 @@ contains
     lambda = material%lambda
     floor_strength = 0.0_wp
     if (material%isotropic_modulus < 0.0_wp) floor_strength = material%residual_strength
-    !$omp simd private(b, volumetric, exx, eyy, ezz, exy, mean, strength) &
+    !$omp simd simdlen(8) private(b, volumetric, exx, eyy, ezz, exy, mean, strength) &
     !$omp private(etaxx, etayy, etazz, etaxy)
     do i = lo, hi
       b = i - lo + 1

@@ -4,7 +4,7 @@ module pd_kinds
   implicit none
   private
 
-  public :: wp, i8, pi, unset, is_set, n_block, block_sum
+  public :: wp, i8, pi, unset, is_set, n_block, block_sum, block_dot
 
   integer, parameter :: wp = real64
   integer, parameter :: i8 = int64
@@ -41,5 +41,20 @@ contains
     block_sum = ((partial(1) + partial(5)) + (partial(2) + partial(6))) &
       + ((partial(3) + partial(7)) + (partial(4) + partial(8)))
   end function block_sum
+
+  !> Sum of products, in the same order.
+  pure real(wp) function block_dot(x, y)
+    real(wp), intent(in) :: x(n_block), y(n_block)
+    integer, parameter :: lanes = 8
+    real(wp) :: partial(lanes)
+    integer  :: i
+
+    partial = 0.0_wp
+    do i = 1, n_block, lanes
+      partial = partial + x(i:i + lanes - 1) * y(i:i + lanes - 1)
+    end do
+    block_dot = ((partial(1) + partial(5)) + (partial(2) + partial(6))) &
+      + ((partial(3) + partial(7)) + (partial(4) + partial(8)))
+  end function block_dot
 
 end module pd_kinds

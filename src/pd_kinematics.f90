@@ -65,7 +65,7 @@ contains
     integer  :: i
     real(wp) :: gxx, gxy, gyx, gyy
 
-    !$omp simd private(gxx, gxy, gyx, gyy)
+    !$omp simd simdlen(8) private(gxx, gxy, gyx, gyy)
     do i = lo, hi
       gxx = gradient(i, 1)
       gxy = gradient(i, 2)

@@ -203,7 +203,7 @@ contains
     real(wp), intent(inout), contiguous :: h(:, :)   !! out: (n,4) [m^4]
     integer :: i, c
 
-    !$omp simd
+    !$omp simd simdlen(8)
     do i = lo, hi
       h(i, 1) = -u(i, 1) * self%moment(i, 1)
       h(i, 2) = -u(i, 1) * self%moment(i, 2)
@@ -243,7 +243,7 @@ contains
     real(wp), intent(inout), contiguous :: f(:, :)        !! out: (n,2)
     integer :: i
 
-    !$omp simd
+    !$omp simd simdlen(8)
     do i = lo, hi
       f(i, 1) = a(i, 1) * moment(i, 1) + a(i, 2) * moment(i, 2)
       f(i, 2) = a(i, 3) * moment(i, 1) + a(i, 4) * moment(i, 2)
@@ -262,7 +262,7 @@ contains
 
     do k = 1, self%n_pairs
       s = self%shift(k)
-      !$omp simd private(plus, minus)
+      !$omp simd simdlen(8) private(plus, minus)
       do i = lo, hi
         plus = self%weight(k) * self%share(i + s) * (c(i) + c(i + s))
         minus = self%weight(k) * self%share(i - s) * (c(i) + c(i - s))
@@ -304,31 +304,46 @@ contains
     real(wp), intent(in),    contiguous :: u(:, :)                     !! (n,2) [m]
     real(wp), intent(in),    contiguous :: deformation_gradient(:, :)  !! F (n,4) xx xy yx yy
     real(wp), intent(inout), contiguous :: z2(:)                       !! out: (n) [m^4]
-    integer  :: lo, hi, i, p, side, s
-    real(wp) :: xi(2), z(2)
+    integer :: lo
 
     z2 = 0.0_wp
-    !$omp parallel do schedule(static) default(none) private(lo, hi, i, p, side, s, xi, z) &
+    !$omp parallel do schedule(static) default(none) private(lo) &
     !$omp shared(self, u, deformation_gradient, z2)
     do lo = self%first_point, self%last_point, n_block
-      hi = min(lo + n_block - 1, self%last_point)
-      do p = 1, self%n_pairs
-        do side = -1, 1, 2
-          s = side * self%shift(p)
-          xi = real(side, wp) * self%xi(p, :)
-          do i = lo, hi
-            if (self%share(i) <= 0.0_wp) cycle
-            associate (f => deformation_gradient)
-              z(1) = u(i + s, 1) - u(i, 1) - (f(i, 1) - 1.0_wp) * xi(1) - f(i, 2) * xi(2)
-              z(2) = u(i + s, 2) - u(i, 2) - f(i, 3) * xi(1) - (f(i, 4) - 1.0_wp) * xi(2)
-            end associate
-            z2(i) = z2(i) + self%weight(p) * self%share(i + s) * (z(1)**2 + z(2)**2)
-          end do
-        end do
-      end do
+      call zero_energy_block(self, lo, min(lo + n_block - 1, self%last_point), u, &
+        deformation_gradient, z2)
     end do
     !$omp end parallel do
   end subroutine zero_energy_squared
+
+  !> The same for points lo to hi.
+  pure subroutine zero_energy_block(self, lo, hi, u, f, z2)
+    class(lattice_operators_t), intent(in) :: self
+    integer,  intent(in) :: lo, hi
+    real(wp), intent(in),    contiguous :: u(:, :)   !! (n,2) [m]
+    real(wp), intent(in),    contiguous :: f(:, :)   !! F (n,4) xx xy yx yy
+    real(wp), intent(inout), contiguous :: z2(:)     !! out: (n) [m^4]; voids: 0
+    real(wp) :: x, y, weight, ax, ay, plus, minus
+    integer  :: i, k, s
+
+    do k = 1, self%n_pairs
+      s = self%shift(k)
+      x = self%xi(k, 1)
+      y = self%xi(k, 2)
+      weight = self%weight(k)
+      !$omp simd simdlen(8) private(ax, ay, plus, minus)
+      do i = lo, hi
+        ax = (f(i, 1) - 1.0_wp) * x + f(i, 2) * y
+        ay = f(i, 3) * x + (f(i, 4) - 1.0_wp) * y
+        plus = (u(i + s, 1) - u(i, 1) - ax)**2 + (u(i + s, 2) - u(i, 2) - ay)**2
+        minus = (u(i - s, 1) - u(i, 1) + ax)**2 + (u(i - s, 2) - u(i, 2) + ay)**2
+        z2(i) = z2(i) + weight * (self%share(i + s) * plus + self%share(i - s) * minus)
+      end do
+    end do
+    do i = lo, hi
+      if (self%share(i) <= 0.0_wp) z2(i) = 0.0_wp
+    end do
+  end subroutine zero_energy_block
 
   !> Number of directed bonds.
   pure integer(i8) function bonds(self)

@@ -5,10 +5,10 @@ module pd_observe
   use pd_force, only: solid_t
   use pd_geometry, only: body_t
   use pd_j2, only: elastic_energy_block, von_mises
-  use pd_kinds, only: block_sum, n_block, wp
+  use pd_kinds, only: block_dot, block_sum, n_block, wp
   use pd_operators, only: operators_t
   use pd_state, only: state_t
-  use pd_strain, only: cauchy, determinant, first_piola_block, green_lagrange, green_lagrange_block
+  use pd_strain, only: cauchy, determinant, green_lagrange, normal_components_block
   implicit none
   private
 
@@ -84,29 +84,37 @@ contains
     type(solid_t), intent(in)  :: solid
     type(state_t), intent(in)  :: state
     real(wp),      intent(out) :: sums(n_sums), largest
-    real(wp) :: weight(n_block), p(n_block, 4), e(n_block, 4), energy(n_block)
-    real(wp) :: terms(n_block, n_sums)
-    integer  :: n
+    real(wp) :: weight(n_block), pxx(n_block), pyy(n_block), eyy(n_block), energy(n_block)
+    real(wp) :: kinetic(n_block), alpha(n_block)
+    integer  :: n, i
 
     n = hi - lo + 1
-    terms = 0.0_wp
-    call first_piola_block(lo, hi, state%deformation_gradient, state%stress, p)
-    call green_lagrange_block(lo, hi, state%deformation_gradient, e)
+    if (n < n_block) then   ! sums go over whole blocks
+      weight = 0.0_wp
+      pxx = 0.0_wp
+      pyy = 0.0_wp
+      eyy = 0.0_wp
+      energy = 0.0_wp
+      kinetic = 0.0_wp
+      alpha = 0.0_wp
+    end if
+    call normal_components_block(lo, hi, state%deformation_gradient, state%stress, pxx, pyy, eyy)
     call elastic_energy_block(solid%material, lo, hi, state%stress, energy)
-    associate (volume => body%volume(lo:hi), boundary => body%boundary(lo:hi), &
-      v => state%velocity(lo:hi, :))
-      weight(:n) = merge(volume, 0.0_wp, boundary == 0)
-      terms(:n, 1) = weight(:n)
-      terms(:n, 2) = weight(:n) * p(:n, 1)
-      terms(:n, 3) = weight(:n) * p(:n, 4)
-      terms(:n, 4) = weight(:n) * e(:n, 2)
-      terms(:n, 5) = volume * energy(:n)
-      terms(:n, 6) = 0.5_wp * solid%density * volume * (v(:, 1)**2 + v(:, 2)**2)
-    end associate
-    do n = 1, n_sums
-      sums(n) = block_sum(terms(:, n))
+    do i = 1, n
+      associate (p => lo - 1 + i)
+        weight(i) = merge(body%volume(p), 0.0_wp, body%boundary(p) == 0)
+        alpha(i) = merge(state%alpha(p), 0.0_wp, body%boundary(p) == 0)
+        energy(i) = body%volume(p) * energy(i)
+        kinetic(i) = body%volume(p) * (state%velocity(p, 1)**2 + state%velocity(p, 2)**2)
+      end associate
     end do
-    largest = maxval(merge(state%alpha(lo:hi), 0.0_wp, body%boundary(lo:hi) == 0))
+    sums(1) = block_sum(weight)
+    sums(2) = block_dot(weight, pxx)
+    sums(3) = block_dot(weight, pyy)
+    sums(4) = block_dot(weight, eyy)
+    sums(5) = block_sum(energy)
+    sums(6) = 0.5_wp * solid%density * block_sum(kinetic)
+    largest = maxval(alpha(:n))
   end subroutine sum_block
 
   !> Energy of the control: with constant c it has a potential, (1/2) sum V c sum omega V_j |z|^2,
@@ -158,35 +166,69 @@ contains
     real(wp),           intent(in)  :: delta                       !! horizon [m]
     real(wp),           intent(out), contiguous :: values(:, :)    !! (components,points)
     real(wp), allocatable :: z2(:)
-    integer :: i, p
 
-    if (name == 'zero_energy') then
+    select case (name)
+    case ('displacement')
+      call take(state%displacement)
+    case ('velocity')
+      call take(state%velocity)
+    case ('stress', 'von_mises')
+      call take_stress(name == 'von_mises')
+    case ('strain')
+      call take_strain()
+    case ('plastic_strain')
+      values(1, :) = state%alpha(body%points)
+    case default   ! zero_energy
       allocate (z2(body%n))
       call operators%zero_energy_squared(state%displacement, state%deformation_gradient, z2)
-    end if
-    !$omp parallel do schedule(static) default(none) private(i, p) &
-    !$omp shared(name, body, operators, state, delta, values, z2)
-    do i = 1, size(body%points)
-      p = body%points(i)
-      select case (name)
-      case ('displacement')
-        values(:, i) = state%displacement(p, :)
-      case ('velocity')
-        values(:, i) = state%velocity(p, :)
-      case ('stress')
-        values(:, i) = cauchy_or_zero(state%deformation_gradient(p, :), state%stress(p, :))
-      case ('strain')
-        values(:, i) = green_lagrange(state%deformation_gradient(p, :))
-      case ('plastic_strain')
-        values(1, i) = state%alpha(p)
-      case ('von_mises')
-        values(1, i) = von_mises(cauchy_or_zero(state%deformation_gradient(p, :), &
-          state%stress(p, :)))
-      case ('zero_energy')
-        values(1, i) = sqrt(z2(p) / operators%weight_sum(p)) / delta
-      end select
-    end do
-    !$omp end parallel do
+      values(1, :) = sqrt(z2(body%points) / operators%weight_sum(body%points)) / delta
+    end select
+
+  contains
+
+    subroutine take(field)
+      real(wp), intent(in) :: field(:, :)   !! (n,components)
+      integer :: i
+
+      !$omp parallel do schedule(static) default(none) private(i) shared(body, values, field)
+      do i = 1, size(body%points)
+        values(:, i) = field(body%points(i), :)
+      end do
+      !$omp end parallel do
+    end subroutine take
+
+    subroutine take_stress(as_mises)
+      logical, intent(in) :: as_mises
+      real(wp) :: f(4), s(4), stress(4)
+      integer  :: i
+
+      !$omp parallel do schedule(static) default(none) private(i, f, s, stress) &
+      !$omp shared(body, values, state, as_mises)
+      do i = 1, size(body%points)
+        f = state%deformation_gradient(body%points(i), :)
+        s = state%stress(body%points(i), :)
+        stress = cauchy_or_zero(f, s)
+        if (as_mises) then
+          values(1, i) = von_mises(stress)
+        else
+          values(:, i) = stress
+        end if
+      end do
+      !$omp end parallel do
+    end subroutine take_stress
+
+    subroutine take_strain()
+      real(wp) :: f(4)
+      integer  :: i
+
+      !$omp parallel do schedule(static) default(none) private(i, f) shared(body, values, state)
+      do i = 1, size(body%points)
+        f = state%deformation_gradient(body%points(i), :)
+        values(:, i) = green_lagrange(f)
+      end do
+      !$omp end parallel do
+    end subroutine take_strain
+
   end subroutine point_field
 
   !> Cauchy stress; 0 where det F is not positive.

@@ -18,9 +18,9 @@ module pd_setup
   use pd_lattice, only: lattice_operators_t, new_lattice_operators
   use pd_loads, only: apply_loads
   use pd_operators, only: operators_t
+  use pd_pressure, only: pressure_t, spread_pressure, surface_vectors
   use pd_random_field, only: lognormal, longest_way, new_random_field, &
     standard_normal
-  use pd_pressure, only: pressure_t, spread_pressure, surface_vectors
   use pd_schedule, only: new_schedule, schedule_t
   use pd_stability, only: highest_frequency, wave_speed
   use pd_state, only: state_t

@@ -151,12 +151,12 @@ contains
 
   end subroutine add_loads
 
-  !> Memory of a run [bytes]: bonds, fields of the state (23 numbers a point), what is fixed (12),
-  !> work space (4), a frame on its way to the disk (29).
+  !> Memory of a run [bytes]: bonds, fields of the state (23 numbers a point), what is fixed (10),
+  !> work space (4), a field of a frame on its way to the disk (5).
   pure real(wp) function memory(model)
     type(model_t), intent(in) :: model
 
-    memory = model%operators%memory() + real(model%body%n, wp) * 8.0_wp * (23 + 12 + 4 + 29)
+    memory = model%operators%memory() + real(model%body%n, wp) * 8.0_wp * (23 + 10 + 4 + 5)
   end function memory
 
   !> Wall clock time of the run [s], from the fastest of a few applications of the linear operator

@@ -101,7 +101,7 @@ contains
     call frame_constants(motion, frame, lower1, lower2, slope1, slope2, start, length)
     drag_work = 0.0_wp
     frame_work = 0.0_wp
-    !$omp simd private(b, place, ref1, ref2, drag1, drag2)
+    !$omp simd simdlen(8) private(b, place, ref1, ref2, drag1, drag2)
     do i = lo, hi
       b = i - lo + 1
       place = place_between(start, length, x(i))
@@ -167,7 +167,7 @@ contains
     call frame_constants(motion, frame, lower1, lower2, slope1, slope2, start, length)
     drag_work = 0.0_wp
     frame_work = 0.0_wp
-    !$omp simd private(b, place, ref1, ref2, drag1, drag2, half1, half2)
+    !$omp simd simdlen(8) private(b, place, ref1, ref2, drag1, drag2, half1, half2)
     do i = lo, hi
       b = i - lo + 1
       place = place_between(start, length, x(i))

@@ -23,8 +23,8 @@ from .study_types import Column, Drawing, State, StudyRun
 from .style import COLOURS, new_figure, style, with_unit
 
 CONTOUR_OPTIONS = COMMON | {
-    "field", "strain", "rows", "same_scale", "low", "high", "deformed", "per_row", "show_line",
-    "panel_height",
+    "by", "field", "strain", "rows", "same_scale", "low", "high", "deformed", "per_row",
+    "show_line", "panel_height",
 }  # fmt: skip
 
 LONGEST_BAR = 70.0  # [mm]
@@ -55,7 +55,8 @@ def contours(
     """A field of several runs, of several states, or of both, on one colour scale.
 
     `strain` one number: all runs at that strain, `rows` = "series" a row for each series. Several
-    numbers: a row for each run. Bodies are drawn to one scale unless `same_scale` is false.
+    numbers: a row for each run, with its label or its value of `by` beside it. Bodies are drawn to
+    one scale unless `same_scale` is false.
     """
     runs = draw.selected(runs, options)
     field = draw.text(options, "field", "plastic_strain")
@@ -76,13 +77,15 @@ def contours(
 
 def _rows(runs: Sequence[StudyRun], options: Mapping[str, Any], field: str) -> list[_Row]:
     strains = draw.numbers(options, "strain")
+    by = draw.text(options, "by")
     by_series = draw.choice(options, "rows", ("runs", "series")) == "series"
     if len(strains) > 1:
         found = []
         for run in runs:
             titles = [f"ε = {100.0 * s:g} %" if run is runs[0] else "" for s in strains]
             cells = [_cell(run, s, t, options, field) for s, t in zip(strains, titles)]
-            found.append(_Row(run.label if len(runs) > 1 else "", cells))
+            heading = draw.shown(draw.value_of(run, by)) if by else run.label
+            found.append(_Row(heading if len(runs) > 1 else "", cells))
         return found
     strain = strains[0] if strains else None
     cells = [_cell(run, strain, run.label, options, field) for run in runs]

@@ -65,7 +65,9 @@ LEGEND = Form(
 RUNS = Form("a table of parameters", lambda v: isinstance(v, Mapping))
 
 OPTIONS: dict[str, Option] = {
-    "by": Option(TEXT, "parameter or column that gives runs their colour"),
+    "by": Option(
+        TEXT, "parameter or column that gives runs their colour (contours: that names their rows)"
+    ),
     "centred": Option(FLAG, "distance from the peak"),
     "column": Option(_words("single", "double"), "width of the figure, in columns of a page"),
     "connect": Option(FLAG, "a line through the points"),
