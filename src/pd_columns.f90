@@ -10,7 +10,7 @@
 !>
 !> Where the weights are products, w_kr = g_k g_r (Gaussian and constant influence), columns differ
 !> in their height only and a high one goes on where a lower one ends: the work grows with m, not
-!> with its square. Other weights have sums of their own for every column, at most as much work as
+!> with its square. Other weights have sums of their own for every column, about as much work as
 !> bond by bond.
 module pd_columns
   use pd_kinds, only: n_block, wp

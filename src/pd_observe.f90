@@ -73,7 +73,7 @@ contains
     seen%external_work = ledger%external_work
     seen%energy_error = surplus(seen, ledger)
     if (abs(seen%energy_error) > 0.0_wp) seen%energy_error = seen%energy_error &
-      / max(abs(ledger%external_work), ledger%initial_kinetic_energy, tiny(1.0_wp))
+      / max(abs(ledger%external_work), ledger%initial_kinetic_energy, abs(seen%energy_error))
   end subroutine observe
 
   !> Sums over points lo to hi: volume, V P_xx, V P_yy, V E_yy (body), strain and kinetic energy

@@ -34,7 +34,7 @@ contains
     class(operators_t), intent(in)  :: operators
     real(wp),           intent(in),  contiguous :: volume(:)         !! V (n) [m^2]
     real(wp),           intent(in),  contiguous :: k_inverse(:, :)   !! (n,3) xx yy xy [1/m^4]
-    real(wp),           intent(out), contiguous :: vectors(:, :)     !! N (n,2) [m]
+    real(wp),           intent(inout), contiguous :: vectors(:, :)   !! out: N (n,2) [m]; voids: 0
     real(wp), allocatable :: a(:, :)
 
     allocate (a(size(volume), 4))

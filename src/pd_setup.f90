@@ -248,7 +248,7 @@ contains
 
     allocate (model%boundaries(size(input%boundaries)))
     do k = 1, size(input%boundaries)
-      model%boundaries(k) = new_boundary(input%boundaries(k), k, model%body)
+      model%boundaries(k) = new_boundary(input%boundaries, k, model%body)
     end do
     allocate (model%free(model%body%n, 2))
     call mark_free(model%body%position, model%body%volume, input%material%density, &
@@ -286,9 +286,9 @@ contains
 
     allocate (model%pressures(size(input%pressures)))
     if (size(input%pressures) == 0) return
-    allocate (vectors(model%body%n, 2))
+    allocate (vectors(model%body%n, 2), source=0.0_wp)
     call surface_vectors(model%operators, model%body%volume, model%solid%k_inverse, vectors)
-    depth = 2 * ceiling(model%delta / model%spacing)   ! where families touch cut families
+    depth = 2 * ceiling(model%delta / model%spacing - 1.0e-6_wp)   ! families that touch cut ones
     do k = 1, size(input%pressures)
       associate (given => input%pressures(k), pressure => model%pressures(k))
         pressure%name = given%name
@@ -304,36 +304,69 @@ contains
   end subroutine set_up_pressures
 
   !> Boundary k of the body.
-  type(boundary_t) function new_boundary(given, k, body) result(boundary)
-    type(boundary_input_t), intent(in) :: given
+  type(boundary_t) function new_boundary(all_given, k, body) result(boundary)
+    type(boundary_input_t), intent(in) :: all_given(:)
     integer,                intent(in) :: k
     type(body_t),           intent(in) :: body
     type(table_t) :: tables(2)
     integer, allocatable :: points(:)
-    logical :: prescribed(2)
-    integer :: i
+    logical  :: prescribed(2)
+    real(wp) :: length(2)
+    integer  :: i
 
-    allocate (points(count(body%boundary == k)))
-    points = pack([(i, i=1, body%n)], body%boundary == k)
-    if (given%contact == 'affine') then
-      tables(1) = new_table(given%times, given%factors, 1.0_wp)
-      boundary = new_affine_boundary(given%name, points, given%velocity_gradient, tables(1))
-      return
-    end if
-    prescribed = .true.
-    if (given%contact == 'smooth') then
-      prescribed = [given%side == 'left' .or. given%side == 'right', &
-        given%side == 'bottom' .or. given%side == 'top']
-    end if
-    tables(1) = new_table(given%times, given%velocities_x, given%velocity(1))
-    tables(2) = new_table(given%times, given%velocities_y, given%velocity(2))
-    boundary = new_rigid_boundary(given%name, points, prescribed, tables(1), tables(2))
-    if (size(given%traction) == 0) return
-    associate (side => body%sides(side_number(given%side)))   ! layers that continue it included
-      call control_by_force(given%traction * sum(side%to - side%from), &
-        new_ramp(given%ramp_time), boundary)
+    associate (given => all_given(k))
+      allocate (points(count(body%boundary == k)))
+      points = pack([(i, i=1, body%n)], body%boundary == k)
+      if (given%contact == 'affine') then
+        tables(1) = new_table(given%times, given%factors, 1.0_wp)
+        boundary = new_affine_boundary(given%name, points, given%velocity_gradient, tables(1))
+        return
+      end if
+      prescribed = .true.
+      if (given%contact == 'smooth') then
+        prescribed = [given%side == 'left' .or. given%side == 'right', &
+          given%side == 'bottom' .or. given%side == 'top']
+      end if
+      tables(1) = new_table(given%times, given%velocities_x, given%velocity(1))
+      tables(2) = new_table(given%times, given%velocities_y, given%velocity(2))
+      boundary = new_rigid_boundary(given%name, points, prescribed, tables(1), tables(2))
+      if (size(given%traction) == 0) return
+      length = [(loaded_length(all_given, given%side, i, body), i=1, 2)]
+      call control_by_force(given%traction * length, new_ramp(given%ramp_time), boundary)
     end associate
   end function new_boundary
+
+  !> Length of a side that carries component c of a traction [m]: of the body, and of the layers
+  !> at its ends where they slide along c and so stand for a body that goes on.
+  pure real(wp) function loaded_length(given, side_name, c, body) result(length)
+    type(boundary_input_t), intent(in) :: given(:)
+    character(*),           intent(in) :: side_name
+    integer,                intent(in) :: c
+    type(body_t),           intent(in) :: body
+    real(wp) :: ends(2)
+    integer  :: along, last
+
+    along = merge(1, 2, side_name == 'bottom' .or. side_name == 'top')
+    ends = [body%lower(along), body%upper(along)]
+    associate (side => body%sides(side_number(side_name)))
+      last = size(side%points)
+      if (slides(body%boundary(side%points(1)))) ends(1) = side%from(1)
+      if (slides(body%boundary(side%points(last)))) ends(2) = side%to(last)
+      length = sum(max(0.0_wp, min(side%to, ends(2)) - max(side%from, ends(1))))
+    end associate
+
+  contains
+
+    !> Whether a boundary is a layer that slides along c.
+    pure logical function slides(b)
+      integer, intent(in) :: b
+
+      slides = .false.
+      if (b > 0) slides = given(b)%contact == 'smooth' .and. (c == 2 .eqv. &
+        (given(b)%side == 'left' .or. given(b)%side == 'right'))
+    end function slides
+
+  end function loaded_length
 
   !> Table from the input; without one, a constant.
   pure type(table_t) function new_table(times, rates, constant) result(table)

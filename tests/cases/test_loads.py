@@ -395,6 +395,30 @@ def test_a_pressure_on_no_point_is_a_model_error(run_case, tmp_path):
     assert "&pressure name = right" in done.stderr
 
 
+def test_a_row_in_every_step_finds_nothing_wrong_with_a_ramp(run_case, tmp_path):
+    """In the first step loads give half a kick without any work: no energy from nowhere."""
+    body = changed(BODY, end_time="0.02", history_count="1000")
+    text = body + BOTTOM + pressed("top", keys="value = 1.0e4, ramp_time = 0.1")
+    done = run_case(text, tmp_path, "--quiet", "--force", "--threads", "1")
+    assert done.returncode == 0, done.stderr
+    errors = np.abs(history(tmp_path / "out" / "case_history.csv")["energy_error"])
+    assert len(errors) < 1000
+    assert errors.max() <= 1.0
+    assert errors[-1] < 1e-3
+
+
+@pytest.mark.parametrize(("contact", "length"), [("smooth", 1.25), ("rough", 1.0)])
+def test_only_walls_that_slide_lengthen_the_side_under_a_traction(
+    run_case, tmp_path, contact, length
+):
+    """A smooth wall of two points, the outer one whole, continues the body; a rough one does not."""
+    text = BODY + BOTTOM + under("0.0, -1.0e3")
+    text += f"&boundary name = 'wall', side = 'left', contact = '{contact}' /\n"
+    done = run_case(text, tmp_path, "--check")
+    assert done.returncode == 0, done.stderr
+    assert f"-1000 Pa on top: 0, -{1000 * length:g} N/m in all" in done.stdout
+
+
 def test_a_sudden_load_that_is_too_large_fails_as_any_run(run_case, tmp_path):
     text = changed(BODY, damping="0.0") + BOTTOM + under("0.0, -1.0e9", "contact = 'smooth'")
     done = run_case(text, tmp_path, "--quiet")
