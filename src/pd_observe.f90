@@ -85,8 +85,8 @@ contains
     type(state_t), intent(in)  :: state
     real(wp),      intent(out) :: sums(n_sums), largest
     real(wp) :: weight(n_block), pxx(n_block), pyy(n_block), eyy(n_block), energy(n_block)
-    real(wp) :: kinetic(n_block), alpha(n_block)
-    integer  :: n, i
+    real(wp) :: kinetic(n_block)
+    integer  :: n
 
     n = hi - lo + 1
     if (n < n_block) then   ! sums go over whole blocks
@@ -96,26 +96,50 @@ contains
       eyy = 0.0_wp
       energy = 0.0_wp
       kinetic = 0.0_wp
-      alpha = 0.0_wp
     end if
     call normal_components_block(lo, hi, state%deformation_gradient, state%stress, pxx, pyy, eyy)
     call elastic_energy_block(solid%material, lo, hi, state%stress, energy)
-    do i = 1, n
-      associate (p => lo - 1 + i)
-        weight(i) = merge(body%volume(p), 0.0_wp, body%boundary(p) == 0)
-        alpha(i) = merge(state%alpha(p), 0.0_wp, body%boundary(p) == 0)
-        energy(i) = body%volume(p) * energy(i)
-        kinetic(i) = body%volume(p) * (state%velocity(p, 1)**2 + state%velocity(p, 2)**2)
-      end associate
-    end do
+    call weigh_block(lo, hi, body%boundary, body%volume, state%velocity, weight, energy, kinetic)
+    largest = largest_of_block(lo, hi, body%boundary, state%alpha)
     sums(1) = block_sum(weight)
     sums(2) = block_dot(weight, pxx)
     sums(3) = block_dot(weight, pyy)
     sums(4) = block_dot(weight, eyy)
     sums(5) = block_sum(energy)
     sums(6) = 0.5_wp * solid%density * block_sum(kinetic)
-    largest = maxval(alpha(:n))
   end subroutine sum_block
+
+  !> Weights of points lo to hi in averages over the body, and their energies times volumes; without
+  !> a branch.
+  pure subroutine weigh_block(lo, hi, boundary, volume, v, weight, energy, kinetic)
+    integer,  intent(in) :: lo, hi
+    integer,  intent(in), contiguous :: boundary(:)       !! 0: the body
+    real(wp), intent(in), contiguous :: volume(:), v(:, :)
+    real(wp), intent(inout) :: weight(n_block), energy(n_block), kinetic(n_block)
+    integer :: i, b
+
+    !$omp simd simdlen(8) private(b)
+    do i = lo, hi
+      b = i - lo + 1
+      weight(b) = real(1 - min(1, abs(boundary(i))), wp) * volume(i)
+      energy(b) = volume(i) * energy(b)
+      kinetic(b) = volume(i) * (v(i, 1)**2 + v(i, 2)**2)
+    end do
+  end subroutine weigh_block
+
+  !> Largest alpha of the body among points lo to hi.
+  pure real(wp) function largest_of_block(lo, hi, boundary, alpha) result(largest)
+    integer,  intent(in) :: lo, hi
+    integer,  intent(in), contiguous :: boundary(:)       !! 0: the body
+    real(wp), intent(in), contiguous :: alpha(:)
+    integer :: i
+
+    largest = 0.0_wp
+    !$omp simd simdlen(8) reduction(max:largest)
+    do i = lo, hi
+      largest = max(largest, real(1 - min(1, abs(boundary(i))), wp) * alpha(i))
+    end do
+  end function largest_of_block
 
   !> Energy of the control: with constant c it has a potential, (1/2) sum V c sum omega V_j |z|^2,
   !> which is the work of the control forces without the error of adding it up.

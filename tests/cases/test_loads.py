@@ -411,7 +411,7 @@ def test_a_row_in_every_step_finds_nothing_wrong_with_a_ramp(run_case, tmp_path)
 def test_only_walls_that_slide_lengthen_the_side_under_a_traction(
     run_case, tmp_path, contact, length
 ):
-    """A smooth wall of two points, the outer one whole, continues the body; a rough one does not."""
+    """A smooth wall of two points, the outer one whole, continues the body; a rough one not."""
     text = BODY + BOTTOM + under("0.0, -1.0e3")
     text += f"&boundary name = 'wall', side = 'left', contact = '{contact}' /\n"
     done = run_case(text, tmp_path, "--check")
