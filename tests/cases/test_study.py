@@ -55,7 +55,7 @@ SLOW = (
     STUDY
     + """\
 [set.boundary.top]
-velocity = [0.0, -0.002]
+velocity = [0.0, -0.0006]
 [set.discretisation]
 spacing = 0.05
 horizon = 0.16
@@ -449,7 +449,7 @@ def half_way(process, folder):
             for run, state in there.items()
             if state == "running"
             and (path := folder / f"results/trial/runs/{run}/{run}_history.csv").exists()
-            and 10 < path.read_bytes().count(b"\n") < 30
+            and 10 < path.read_bytes().count(b"\n") < 45
         ]
         if "done" in there.values() and begun:
             return begun
