@@ -17,12 +17,22 @@ module pd_columns
   implicit none
   private
 
-  public :: columns_t, new_columns, add_x_sums, add_y_sums
+  public :: columns_t, sums_t, new_columns, add_sums
 
   integer, parameter :: group = 4   !! columns to a pass: their sums stay in registers
   !> Numbers in all strands that are kept on the stack, up to about m = 30; more are allocated for
   !> every block.
   integer, parameter :: most_numbers = 8192
+
+  !> One of the sums, X or Y: what is added up and down, and across.
+  type :: sums_t
+    real(wp) :: below = 1.0_wp                   !! sign of the rows below row 0
+    real(wp) :: left = 1.0_wp                    !! sign of the columns to the left
+    real(wp), allocatable :: rows(:, :)          !! weights of the rows of a strand (0:2,strands)
+    !> Columns, padded to whole groups: where they are among the strands, and their weights.
+    integer,  allocatable :: plus(:), minus(:)
+    real(wp), allocatable :: weight(:)
+  end type sums_t
 
   !> Strands are sums up and down a column; each goes on from another one, or begins, and takes up
   !> to two rows more.
@@ -32,13 +42,8 @@ module pd_columns
     integer,  allocatable :: from(:)             !! strand that this one goes on from; 0: begins
     integer,  allocatable :: rows(:, :)          !! rows that it takes (2,strands); 0: none
     integer,  allocatable :: shift(:, :)         !! places from row 0 to these (2,strands)
-    real(wp), allocatable :: even(:, :)          !! their weights in P (0:2,strands); 0: row 0
-    real(wp), allocatable :: odd(:, :)           !! their weights in Q (0:2,strands)
-    !> Columns, padded to whole groups: where they are among the strands, side by side with
-    !> `width` numbers each, and their weights.
-    integer :: width = 0
-    integer,  allocatable :: x_plus(:), x_minus(:), y_plus(:), y_minus(:)
-    real(wp), allocatable :: x_weight(:), y_weight(:)
+    integer :: width = 0                         !! numbers of a strand, which lie side by side
+    type(sums_t) :: x, y
   end type columns_t
 
 contains
@@ -59,7 +64,9 @@ contains
     end do
     most = sum(height / 2 + 1)
     allocate (columns%from(most), columns%rows(2, most), columns%shift(2, most), source=0)
-    allocate (columns%even(0:2, most), columns%odd(0:2, most), source=0.0_wp)
+    allocate (columns%x%rows(0:2, most), columns%y%rows(0:2, most), source=0.0_wp)
+    columns%x%left = -1.0_wp
+    columns%y%below = -1.0_wp
     product_form = is_product(weight)
     strand = 0
     across = 1.0_wp
@@ -124,14 +131,14 @@ contains
       columns%n_strands = columns%n_strands + 1
       associate (s => columns%n_strands)
         columns%from(s) = k
-        if (k == 0) columns%even(0, s) = along(0)
+        if (k == 0) columns%x%rows(0, s) = along(0)
         do r = 1, 2
           if (next == top) exit
           next = next + 1
           columns%rows(r, s) = next
           columns%shift(r, s) = next * stride
-          columns%even(r, s) = along(next)
-          columns%odd(r, s) = along(next) * spacing * real(next, wp)
+          columns%x%rows(r, s) = along(next)
+          columns%y%rows(r, s) = along(next) * spacing * real(next, wp)
         end do
         k = s
       end associate
@@ -153,9 +160,9 @@ contains
     n_y = group * ((n_y + group - 1) / group)
     ! what pads a group has no weight, but must be a number: that of column 0
     origin = (strand(0) - 1) * columns%width + columns%reach
-    allocate (columns%x_plus(n_x), columns%x_minus(n_x), columns%y_plus(n_y), &
-      columns%y_minus(n_y), source=origin)
-    allocate (columns%x_weight(n_x), columns%y_weight(n_y), source=0.0_wp)
+    allocate (columns%x%plus(n_x), columns%x%minus(n_x), columns%y%plus(n_y), &
+      columns%y%minus(n_y), source=origin)
+    allocate (columns%x%weight(n_x), columns%y%weight(n_y), source=0.0_wp)
     n_x = 0
     n_y = 0
     do k = 0, columns%reach
@@ -163,81 +170,52 @@ contains
       origin = (strand(k) - 1) * columns%width + columns%reach
       if (k > 0) then
         n_x = n_x + 1
-        columns%x_plus(n_x) = origin + k
-        columns%x_minus(n_x) = origin - k
-        columns%x_weight(n_x) = across(k) * spacing * real(k, wp)
+        columns%x%plus(n_x) = origin + k
+        columns%x%minus(n_x) = origin - k
+        columns%x%weight(n_x) = across(k) * spacing * real(k, wp)
       end if
       if (height(k) == 0) cycle
       n_y = n_y + 1
-      columns%y_plus(n_y) = origin + k
-      columns%y_minus(n_y) = origin - k
-      columns%y_weight(n_y) = merge(0.5_wp, 1.0_wp, k == 0) * across(k)
+      columns%y%plus(n_y) = origin + k
+      columns%y%minus(n_y) = origin - k
+      columns%y%weight(n_y) = merge(0.5_wp, 1.0_wp, k == 0) * across(k)
     end do
   end subroutine list_columns
 
-  !> sums <- sums + X[f] for points lo to hi.
-  pure subroutine add_x_sums(columns, lo, hi, f, sums)
+  !> total <- total + X[f] or Y[f] for points lo to hi.
+  pure subroutine add_sums(columns, sums, lo, hi, f, total)
     type(columns_t), intent(in) :: columns
+    type(sums_t),    intent(in) :: sums                     !! columns%x or columns%y
     integer,         intent(in) :: lo, hi
     real(wp),        intent(in),    contiguous :: f(:)      !! (n)
-    real(wp),        intent(inout), contiguous :: sums(:)   !! (hi-lo+1); row 1 is point lo
+    real(wp),        intent(inout), contiguous :: total(:)  !! (hi-lo+1); row 1 is point lo
     real(wp) :: strands(most_numbers)
     real(wp), allocatable :: many(:)
 
     if (columns%width * columns%n_strands <= most_numbers) then
-      call add_x_by_strands(columns, lo, hi, f, strands, sums)
+      call add_by_strands(columns, sums, lo, hi, f, strands, total)
     else
       allocate (many(columns%width * columns%n_strands))
-      call add_x_by_strands(columns, lo, hi, f, many, sums)
+      call add_by_strands(columns, sums, lo, hi, f, many, total)
     end if
-  end subroutine add_x_sums
+  end subroutine add_sums
 
-  pure subroutine add_x_by_strands(columns, lo, hi, f, strands, sums)
+  !> The same with given work space.
+  pure subroutine add_by_strands(columns, sums, lo, hi, f, strands, total)
     type(columns_t), intent(in) :: columns
+    type(sums_t),    intent(in) :: sums
     integer,         intent(in) :: lo, hi
     real(wp),        intent(in),    contiguous :: f(:)
     real(wp),        intent(inout), contiguous :: strands(:)   !! work space
-    real(wp),        intent(inout), contiguous :: sums(:)
+    real(wp),        intent(inout), contiguous :: total(:)
     integer :: g
 
-    call sum_strands(columns, lo, hi, columns%even, 1.0_wp, f, strands)
-    do g = 1, size(columns%x_plus), group
-      call add_columns(hi - lo + 1, columns%x_plus(g:g + group - 1), &
-        columns%x_minus(g:g + group - 1), columns%x_weight(g:g + group - 1), -1.0_wp, strands, sums)
+    call sum_strands(columns, lo, hi, sums%rows, sums%below, f, strands)
+    do g = 1, size(sums%plus), group
+      call add_columns(hi - lo + 1, sums%plus(g:g + group - 1), sums%minus(g:g + group - 1), &
+        sums%weight(g:g + group - 1), sums%left, strands, total)
     end do
-  end subroutine add_x_by_strands
-
-  !> sums <- sums + Y[f] for points lo to hi.
-  pure subroutine add_y_sums(columns, lo, hi, f, sums)
-    type(columns_t), intent(in) :: columns
-    integer,         intent(in) :: lo, hi
-    real(wp),        intent(in),    contiguous :: f(:)      !! (n)
-    real(wp),        intent(inout), contiguous :: sums(:)   !! (hi-lo+1); row 1 is point lo
-    real(wp) :: strands(most_numbers)
-    real(wp), allocatable :: many(:)
-
-    if (columns%width * columns%n_strands <= most_numbers) then
-      call add_y_by_strands(columns, lo, hi, f, strands, sums)
-    else
-      allocate (many(columns%width * columns%n_strands))
-      call add_y_by_strands(columns, lo, hi, f, many, sums)
-    end if
-  end subroutine add_y_sums
-
-  pure subroutine add_y_by_strands(columns, lo, hi, f, strands, sums)
-    type(columns_t), intent(in) :: columns
-    integer,         intent(in) :: lo, hi
-    real(wp),        intent(in),    contiguous :: f(:)
-    real(wp),        intent(inout), contiguous :: strands(:)   !! work space
-    real(wp),        intent(inout), contiguous :: sums(:)
-    integer :: g
-
-    call sum_strands(columns, lo, hi, columns%odd, -1.0_wp, f, strands)
-    do g = 1, size(columns%y_plus), group
-      call add_columns(hi - lo + 1, columns%y_plus(g:g + group - 1), &
-        columns%y_minus(g:g + group - 1), columns%y_weight(g:g + group - 1), 1.0_wp, strands, sums)
-    end do
-  end subroutine add_y_by_strands
+  end subroutine add_by_strands
 
   !> All strands at points lo to hi and as far to either side as the family goes.
   pure subroutine sum_strands(columns, lo, hi, weight, side, f, strands)

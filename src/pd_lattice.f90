@@ -12,7 +12,7 @@
 !> inner loops: voids carry zero.
 !> Source: doc/theory.md, sections 2, 4 and 5.
 module pd_lattice
-  use pd_columns, only: add_x_sums, add_y_sums, columns_t, new_columns
+  use pd_columns, only: add_sums, columns_t, new_columns
   use pd_families, only: horizon_t, influence, within_horizon
   use pd_kinds, only: i8, n_block, wp
   use pd_operators, only: operators_t
@@ -211,8 +211,8 @@ contains
       h(i, 4) = -u(i, 2) * self%moment(i, 2)
     end do
     do c = 1, 2
-      call add_x_sums(self%columns, lo, hi, w(:, c), h(lo:hi, 2 * c - 1))
-      call add_y_sums(self%columns, lo, hi, w(:, c), h(lo:hi, 2 * c))
+      call add_sums(self%columns, self%columns%x, lo, hi, w(:, c), h(lo:hi, 2 * c - 1))
+      call add_sums(self%columns, self%columns%y, lo, hi, w(:, c), h(lo:hi, 2 * c))
     end do
   end subroutine gradient_of_shares
 
@@ -230,8 +230,8 @@ contains
       call add_own_part(lo, hi, self%moment, a, f)
     end if
     do c = 1, 2
-      call add_x_sums(self%columns, lo, hi, a(:, 2 * c - 1), f(lo:hi, c))
-      call add_y_sums(self%columns, lo, hi, a(:, 2 * c), f(lo:hi, c))
+      call add_sums(self%columns, self%columns%x, lo, hi, a(:, 2 * c - 1), f(lo:hi, c))
+      call add_sums(self%columns, self%columns%y, lo, hi, a(:, 2 * c), f(lo:hi, c))
     end do
   end subroutine divergence_block
 
