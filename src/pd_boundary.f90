@@ -10,7 +10,8 @@ module pd_boundary
 
   public :: table_t, boundary_t, platens_t, new_rigid_boundary, new_affine_boundary
   public :: new_ramp, control_by_force
-  public :: move, boundary_forces, motion_work, mark_free, nominal_strain, time_of_strain
+  public :: move, boundary_forces, mode_forces, motion_work, mark_free
+  public :: nominal_strain, time_of_strain
   public :: reference_ends
 
   !> Rate that is linear between its times and constant before the first and after the last.
@@ -258,7 +259,7 @@ contains
   !> Work of the prescribed motion from t to t_next on everything that moves with it: the
   !> reactions, by the trapezoidal rule, and the kinetic energy of the prescribed components.
   pure real(wp) function motion_work(before, after, t, t_next) result(work)
-    type(boundary_t), intent(in) :: before(:)   !! with the forces at t
+    real(wp),         intent(in) :: before(:, :)   !! `mode_forces` at t (2,boundaries)
     type(boundary_t), intent(in) :: after(:)    !! with the forces at t_next
     real(wp),         intent(in) :: t, t_next   !! [s]
     integer :: b, k
@@ -267,13 +268,24 @@ contains
     do b = 1, size(after)
       do k = 1, merge(1, 2, after(b)%affine)
         associate (table => after(b)%tables(k))
-          work = work + 0.5_wp * (before(b)%mode_force(k) + after(b)%mode_force(k)) &
+          work = work + 0.5_wp * (before(k, b) + after(b)%mode_force(k)) &
             * (table%integral(t_next) - table%integral(t)) &
             + 0.5_wp * after(b)%mode_mass(k) * (table%rate(t_next)**2 - table%rate(t)**2)
         end associate
       end do
     end do
   end function motion_work
+
+  !> The forces conjugate to the modes of each boundary.
+  pure function mode_forces(boundaries) result(forces)
+    type(boundary_t), intent(in) :: boundaries(:)
+    real(wp) :: forces(2, size(boundaries))
+    integer  :: b
+
+    do b = 1, size(boundaries)
+      forces(:, b) = boundaries(b)%mode_force
+    end do
+  end function mode_forces
 
   !> Nominal strain at time t: relative approach of the platens over the extent of the body
   !> between them, compression positive. Without displacements all motion must be prescribed.

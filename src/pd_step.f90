@@ -3,7 +3,7 @@
 !> u gives F, F gives S and A, A gives f, f gives v.
 !> Source: doc/theory.md, section 6.
 module pd_step
-  use pd_boundary, only: boundary_forces, boundary_t, motion_work, move
+  use pd_boundary, only: boundary_forces, mode_forces, motion_work, move
   use pd_force, only: force_state, internal_force
   use pd_kinds, only: wp
   use pd_loads, only: apply_loads, load_work
@@ -30,7 +30,7 @@ contains
     type(ledger_t), intent(inout) :: ledger
     type(timing_t), intent(inout) :: timing
     integer,        intent(out)   :: failed_point
-    type(boundary_t), allocatable :: before(:)
+    real(wp) :: before(2, size(model%boundaries))
     real(wp) :: t, t_next, first_work(2), second_work(2), dissipated, loads_work
 
     t = real(step - 1, wp) * model%motion%time_step
@@ -52,7 +52,7 @@ contains
       call kick(model%motion, damping_frame(model, t_next), x, volume, free, f, v, second_work)
       call timing%lap(1)
 
-      allocate (before(size(model%boundaries)), source=model%boundaries)
+      before = mode_forces(model%boundaries)
       call boundary_forces(x, volume, t_next, f, model%boundaries)
     end associate
     ledger%plastic_dissipation = ledger%plastic_dissipation + dissipated
