@@ -57,7 +57,7 @@ contains
 
     n_blocks = (operators%last_point - operators%first_point) / n_block + 1
     allocate (dissipated_in(n_blocks), failed_in(n_blocks), times(3, n_blocks))
-    call operators%weigh_displacement(state%displacement)
+    call operators%weigh_displacement(state%displacement, solid%control)
     !$omp parallel do schedule(static) default(none) private(block, lo, hi) &
     !$omp shared(n_blocks, operators, solid, volume, state, a, dissipated_in, failed_in) &
     !$omp shared(timing, times)
@@ -179,7 +179,7 @@ contains
     type(timing_t) :: timing
     integer :: lo, hi
 
-    call operators%weigh_displacement(u)
+    call operators%weigh_displacement(u, solid%control)
     !$omp parallel do schedule(static) default(none) private(lo, hi) &
     !$omp shared(operators, solid, u, h, a)
     do lo = operators%first_point, operators%last_point, n_block

@@ -1,11 +1,12 @@
 !> The operators of a body on a lattice: all points share one set of offsets and weights.
 !>
 !> Places of a box of rows, voids among them, are numbered along the rows, so that the bond to the
-!> place kx columns and ky rows away is a shift by kx + ky * stride. Both sums go by columns
+!> place kx columns and ky rows away is a shift by kx + ky * stride. All sums go by columns
 !> (`pd_columns`):
 !>
 !>   G[u]_i = sum_j omega V_0 u~_j (x) xi - u_i (x) s_i
 !>   D[A]_i = sum_j omega V_0 A~_j xi + A_i s_i
+!>   Z[u]_i = c_i sum_j omega V_0 u~_j + sum_j omega V_0 c_j u~_j - u_i sum_j omega V_j (c_i + c_j)
 !>
 !> with u~ = u V / V_0, V_0 = dx^2 (the fields as weighed), and s_i = sum_j omega V_j xi, which
 !> differs from zero only where points are missing or own less than a whole cell. No test in the
@@ -27,6 +28,7 @@ module pd_lattice
     integer, private :: fewest = 0, poorest = 0           !! bonds of any point, and the first such
     integer(i8), private :: n_bonds = 0                   !! directed
     type(columns_t), private :: columns
+    real(wp), private :: own_weight = 0.0_wp              !! omega V_0 of a bond of length zero [m^2]
     integer,  allocatable, private :: shift(:)            !! (pairs)
     real(wp), allocatable, private :: xi(:, :)            !! (pairs,2) [m]
     real(wp), allocatable, private :: weight(:)           !! omega V_0 (pairs) [m^2]
@@ -78,6 +80,8 @@ contains
     operators%xi = operators%xi(:k, :)
     operators%weight = operators%weight(:k)
     operators%columns = columns_of(horizon, spacing, stride, reach)
+    operators%own_weight = influence(horizon, 0.0_wp) * spacing**2
+    operators%pulls = .true.
 
     allocate (operators%share(operators%n))
     operators%share = volume / spacing**2
@@ -250,27 +254,57 @@ contains
     end do
   end subroutine add_own_part
 
-  !> f <- f + Z[u] for points lo to hi, bond by bond: c varies, and voids must not pull.
+  !> f <- f + Z[u] for points lo to hi.
+  !>
+  !>   Z_i = c_i L[u~]_i + L[c u~]_i - u_i (c_i L[share]_i + L[c share]_i)
+  !>
+  !> Each L contains the point itself; its terms cancel. c u~ and c share are kept by
+  !> `weigh_displacement`.
   pure subroutine control_block(self, lo, hi, c, u, f)
     class(lattice_operators_t), intent(in) :: self
     integer,  intent(in) :: lo, hi
     real(wp), intent(in),    contiguous :: c(:)      !! (n) [N/m^6]
     real(wp), intent(in),    contiguous :: u(:, :)   !! (n,2) [m]
     real(wp), intent(inout), contiguous :: f(:, :)   !! (n,2) [N/m^3]
-    integer  :: i, k, s
-    real(wp) :: plus, minus
 
-    do k = 1, self%n_pairs
-      s = self%shift(k)
-      !$omp simd simdlen(8) private(plus, minus)
+    if (self%weighs) then
+      call control_of_shares(self, lo, hi, c, self%weighed, u, f)
+    else
+      call control_of_shares(self, lo, hi, c, u, u, f)
+    end if
+  end subroutine control_block
+
+  !> The same from u~ and u.
+  pure subroutine control_of_shares(self, lo, hi, c, w, u, f)
+    class(lattice_operators_t), intent(in) :: self
+    integer,  intent(in) :: lo, hi
+    real(wp), intent(in),    contiguous :: c(:)      !! (n) [N/m^6]
+    real(wp), intent(in),    contiguous :: w(:, :)   !! u~ (n,2) [m]
+    real(wp), intent(in),    contiguous :: u(:, :)   !! (n,2) [m]
+    real(wp), intent(inout), contiguous :: f(:, :)   !! (n,2) [N/m^3]
+    real(wp) :: held(n_block), near(n_block), pulled(n_block)
+    integer  :: i, b, n, k
+
+    n = hi - lo + 1
+    held = 0.0_wp
+    call add_sums(self%columns, self%columns%l, lo, hi, self%pull(:, 3), held(:n))
+    !$omp simd simdlen(8) private(b)
+    do i = lo, hi
+      b = i - lo + 1
+      held(b) = held(b) + c(i) * (self%weight_sum(i) + self%own_weight * self%share(i))
+    end do
+    do k = 1, 2
+      near = 0.0_wp
+      pulled = 0.0_wp
+      call add_sums(self%columns, self%columns%l, lo, hi, w(:, k), near(:n))
+      call add_sums(self%columns, self%columns%l, lo, hi, self%pull(:, k), pulled(:n))
+      !$omp simd simdlen(8) private(b)
       do i = lo, hi
-        plus = self%weight(k) * self%share(i + s) * (c(i) + c(i + s))
-        minus = self%weight(k) * self%share(i - s) * (c(i) + c(i - s))
-        f(i, 1) = f(i, 1) + plus * (u(i + s, 1) - u(i, 1)) + minus * (u(i - s, 1) - u(i, 1))
-        f(i, 2) = f(i, 2) + plus * (u(i + s, 2) - u(i, 2)) + minus * (u(i - s, 2) - u(i, 2))
+        b = i - lo + 1
+        f(i, k) = f(i, k) + ((c(i) * near(b) + pulled(b)) - held(b) * u(i, k))
       end do
     end do
-  end subroutine control_block
+  end subroutine control_of_shares
 
   !> K = sum_j omega V_j xi (x) xi.
   subroutine shape_tensor(self, k)
@@ -367,6 +401,7 @@ contains
 
     memory = real(self%n, wp) * 32.0_wp
     if (self%weighs) memory = memory + real(self%n, wp) * 32.0_wp
+    if (allocated(self%pull)) memory = memory + real(self%n, wp) * 24.0_wp
   end function memory
 
 end module pd_lattice
