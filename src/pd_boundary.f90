@@ -10,7 +10,7 @@ module pd_boundary
 
   public :: table_t, boundary_t, platens_t, new_rigid_boundary, new_affine_boundary
   public :: new_ramp, control_by_force
-  public :: move, boundary_forces, mode_forces, motion_work, mark_free
+  public :: move, boundary_forces, motion_work, mark_free
   public :: nominal_strain, time_of_strain
   public :: reference_ends
 
@@ -36,6 +36,7 @@ module pd_boundary
     type(table_t) :: tables(2)               !! rigid: velocity x, y [m/s]; affine: factor, -
     real(wp) :: force(2) = 0.0_wp            !! that the boundary applies to the body [N/m]
     real(wp) :: mode_force(2) = 0.0_wp       !! work-conjugate to a_k
+    real(wp) :: mode_force_before(2) = 0.0_wp   !! in the step before
     real(wp) :: mode_mass(2) = 0.0_wp        !! rho sum V |m_k|^2
   end type boundary_t
 
@@ -241,6 +242,7 @@ contains
     do b = 1, size(boundaries)
       associate (boundary => boundaries(b))
         boundary%force = 0.0_wp
+        boundary%mode_force_before = boundary%mode_force
         boundary%mode_force = 0.0_wp
         do k = 1, size(boundary%points)
           p = boundary%points(k)
@@ -258,34 +260,24 @@ contains
 
   !> Work of the prescribed motion from t to t_next on everything that moves with it: the
   !> reactions, by the trapezoidal rule, and the kinetic energy of the prescribed components.
-  pure real(wp) function motion_work(before, after, t, t_next) result(work)
-    real(wp),         intent(in) :: before(:, :)   !! `mode_forces` at t (2,boundaries)
-    type(boundary_t), intent(in) :: after(:)    !! with the forces at t_next
-    real(wp),         intent(in) :: t, t_next   !! [s]
+  pure real(wp) function motion_work(boundaries, t, t_next) result(work)
+    type(boundary_t), intent(in) :: boundaries(:)   !! with the forces at t and t_next
+    real(wp),         intent(in) :: t, t_next       !! [s]
     integer :: b, k
 
     work = 0.0_wp
-    do b = 1, size(after)
-      do k = 1, merge(1, 2, after(b)%affine)
-        associate (table => after(b)%tables(k))
-          work = work + 0.5_wp * (before(k, b) + after(b)%mode_force(k)) &
-            * (table%integral(t_next) - table%integral(t)) &
-            + 0.5_wp * after(b)%mode_mass(k) * (table%rate(t_next)**2 - table%rate(t)**2)
-        end associate
-      end do
+    do b = 1, size(boundaries)
+      associate (boundary => boundaries(b))
+        do k = 1, merge(1, 2, boundary%affine)
+          associate (table => boundary%tables(k))
+            work = work + 0.5_wp * (boundary%mode_force_before(k) + boundary%mode_force(k)) &
+              * (table%integral(t_next) - table%integral(t)) &
+              + 0.5_wp * boundary%mode_mass(k) * (table%rate(t_next)**2 - table%rate(t)**2)
+          end associate
+        end do
+      end associate
     end do
   end function motion_work
-
-  !> The forces conjugate to the modes of each boundary.
-  pure function mode_forces(boundaries) result(forces)
-    type(boundary_t), intent(in) :: boundaries(:)
-    real(wp) :: forces(2, size(boundaries))
-    integer  :: b
-
-    do b = 1, size(boundaries)
-      forces(:, b) = boundaries(b)%mode_force
-    end do
-  end function mode_forces
 
   !> Nominal strain at time t: relative approach of the platens over the extent of the body
   !> between them, compression positive. Without displacements all motion must be prescribed.

@@ -7,7 +7,7 @@ module pd_force
   use pd_kinds, only: n_block, pi, wp
   use pd_kinematics, only: deformation_gradient_block
   use pd_operators, only: operators_t
-  use pd_state, only: state_t
+  use pd_state, only: block_work_t, state_t
   use pd_strain, only: determinant, force_state_block, green_lagrange_block, small_strain_block
   use pd_timing, only: now, timing_t
   implicit none
@@ -40,74 +40,68 @@ contains
   !> u gives F, F gives S (radial return; the history goes from step n to n+1) and A, one block of
   !> points after the other: what a block has written is in the cache where it is needed next.
   !>
-  !> `dissipated`: work of S on dE^p of this step, by the trapezoidal rule, over all points.
+  !> `blocks`: what each has dissipated in this step, work of S on dE^p by the trapezoidal rule.
   !> `failed`: 0, or the first point whose det F is not positive (NaN included).
-  subroutine force_state(operators, solid, volume, state, a, timing, dissipated, failed)
+  subroutine force_state(operators, solid, volume, state, a, blocks, timing, failed)
     class(operators_t), intent(inout) :: operators
     type(solid_t),  intent(in)    :: solid
     real(wp),       intent(in),    contiguous :: volume(:)   !! V (n) [m^2]
     type(state_t),  intent(inout) :: state
     real(wp),       intent(inout), contiguous :: a(:, :)     !! out: A (n,4), weighed [N/m^6]
+    type(block_work_t), intent(inout) :: blocks
     type(timing_t), intent(inout) :: timing
-    real(wp),       intent(out)   :: dissipated              !! [J/m]
     integer,        intent(out)   :: failed
-    real(wp), allocatable :: dissipated_in(:), times(:, :)
-    integer,  allocatable :: failed_in(:)
-    integer :: block, n_blocks, lo, hi
+    integer :: block, lo, hi
 
-    n_blocks = (operators%last_point - operators%first_point) / n_block + 1
-    allocate (dissipated_in(n_blocks), failed_in(n_blocks), times(3, n_blocks))
+    call blocks%fit(operators%first_point, operators%last_point)
     call operators%weigh_displacement(state%displacement, solid%control)
     !$omp parallel do schedule(static) default(none) private(block, lo, hi) &
-    !$omp shared(n_blocks, operators, solid, volume, state, a, dissipated_in, failed_in) &
-    !$omp shared(timing, times)
-    do block = 1, n_blocks
+    !$omp shared(operators, solid, volume, state, a, blocks, timing)
+    do block = 1, size(blocks%failed)
       lo = operators%first_point + (block - 1) * n_block
       hi = min(lo + n_block - 1, operators%last_point)
-      if (timing%blocks) times(1, block) = now()
+      if (timing%blocks) blocks%times(1, block) = now()
       call operators%gradient_block(lo, hi, state%displacement, state%deformation_gradient)
-      if (timing%blocks) times(2, block) = now()
+      if (timing%blocks) blocks%times(2, block) = now()
       call deformation_gradient_block(lo, hi, solid%k_inverse, state%deformation_gradient)
-      call force_state_of_block(lo, hi, solid, volume, state, a, dissipated_in(block), &
-        failed_in(block))
+      call force_state_of_block(lo, hi, solid, volume, state, a, blocks%dissipated(block), &
+        blocks%failed(block))
       call operators%weigh_block(lo, hi, a)
-      if (timing%blocks) times(3, block) = now()
+      if (timing%blocks) blocks%times(3, block) = now()
     end do
     !$omp end parallel do
-    dissipated = sum(dissipated_in)
     failed = 0
-    do block = n_blocks, 1, -1
-      if (failed_in(block) > 0) failed = failed_in(block)
+    do block = size(blocks%failed), 1, -1
+      if (blocks%failed(block) > 0) failed = blocks%failed(block)
     end do
-    call timing%lap_blocks([2, 3], times)
+    call timing%lap_blocks(2, blocks%times)
   end subroutine force_state
 
   !> A gives f, with the zero-energy control.
-  subroutine internal_force(operators, solid, u, a, f, timing)
+  subroutine internal_force(operators, solid, u, a, f, blocks, timing)
     class(operators_t), intent(in) :: operators
     type(solid_t),  intent(in)    :: solid
     real(wp),       intent(in),    contiguous :: u(:, :)   !! (n,2) [m]
     real(wp),       intent(in),    contiguous :: a(:, :)   !! A (n,4), weighed [N/m^6]
     real(wp),       intent(inout), contiguous :: f(:, :)   !! out: (n,2) [N/m^3]
+    type(block_work_t), intent(inout) :: blocks
     type(timing_t), intent(inout) :: timing
-    real(wp), allocatable :: times(:, :)
-    integer :: block, n_blocks, lo, hi
+    integer :: block, lo, hi
 
-    n_blocks = (operators%last_point - operators%first_point) / n_block + 1
-    allocate (times(3, n_blocks))
+    call blocks%fit(operators%first_point, operators%last_point)
     !$omp parallel do schedule(static) default(none) private(block, lo, hi) &
-    !$omp shared(n_blocks, operators, solid, u, a, f, timing, times)
-    do block = 1, n_blocks
+    !$omp shared(operators, solid, u, a, f, blocks, timing)
+    do block = 1, size(blocks%failed)
       lo = operators%first_point + (block - 1) * n_block
       hi = min(lo + n_block - 1, operators%last_point)
-      if (timing%blocks) times(1, block) = now()
+      if (timing%blocks) blocks%times(1, block) = now()
       call operators%divergence_block(lo, hi, a, f)
-      if (timing%blocks) times(2, block) = now()
+      if (timing%blocks) blocks%times(2, block) = now()
       if (allocated(solid%control)) call operators%control_block(lo, hi, solid%control, u, f)
-      if (timing%blocks) times(3, block) = now()
+      if (timing%blocks) blocks%times(3, block) = now()
     end do
     !$omp end parallel do
-    call timing%lap_blocks([4, 5], times)
+    call timing%lap_blocks(4, blocks%times)
   end subroutine internal_force
 
   !> The same for points lo to hi.
@@ -176,6 +170,7 @@ contains
     real(wp), intent(inout), contiguous :: h(:, :)   !! work space (n,4)
     real(wp), intent(inout), contiguous :: a(:, :)   !! work space (n,4)
     real(wp), intent(inout), contiguous :: f(:, :)   !! out: (n,2) [N/m^3]
+    type(block_work_t) :: blocks
     type(timing_t) :: timing
     integer :: lo, hi
 
@@ -190,7 +185,7 @@ contains
       call operators%weigh_block(lo, hi, a)
     end do
     !$omp end parallel do
-    call internal_force(operators, solid, u, a, f, timing)
+    call internal_force(operators, solid, u, a, f, blocks, timing)
   end subroutine linear_force
 
   !> A of a small displacement of points lo to hi, from F.

@@ -27,26 +27,52 @@ contains
     real(wp),         intent(in)    :: volume(:)   !! V (n) [m^2]
     real(wp),         intent(in)    :: t           !! [s]
     real(wp),         intent(inout) :: f(:, :)     !! force density (n,2) [N/m^3]
-    real(wp) :: factor
-    integer  :: c, k
+    integer :: c, k
 
     do k = 1, size(pressures)
-      associate (points => pressures(k)%points, axis => pressures(k)%axis)
-        factor = pressures(k)%factor%rate(t)
-        f(points, axis) = f(points, axis) + factor * pressures(k)%force / volume(points)
-      end associate
+      call add_forces(pressures(k)%points, pressures(k)%factor%rate(t), pressures(k)%force, &
+        volume, f(:, pressures(k)%axis))
     end do
     do k = 1, size(boundaries)
       do c = 1, 2
-        if (.not. boundaries(k)%held(c)) cycle
-        associate (points => boundaries(k)%points)
-          factor = boundaries(k)%factor%rate(t)
-          f(points, c) = (sum(volume(points) * f(points, c)) &
-            + factor * boundaries(k)%applied(c)) / sum(volume(points))
-        end associate
+        if (boundaries(k)%held(c)) call share_force(boundaries(k)%points, &
+          boundaries(k)%factor%rate(t) * boundaries(k)%applied(c), volume, f(:, c))
       end do
     end do
   end subroutine apply_loads
+
+  !> f <- f + factor force / V at some points.
+  pure subroutine add_forces(points, factor, force, volume, f)
+    integer,  intent(in)    :: points(:)
+    real(wp), intent(in)    :: factor, force(:)   !! force on each of the points [N/m]
+    real(wp), intent(in)    :: volume(:)          !! V (n) [m^2]
+    real(wp), intent(inout) :: f(:)               !! one component (n) [N/m^3]
+    integer :: k
+
+    do k = 1, size(points)
+      f(points(k)) = f(points(k)) + factor * force(k) / volume(points(k))
+    end do
+  end subroutine add_forces
+
+  !> f <- (sum V f + force) / sum V at some points.
+  pure subroutine share_force(points, force, volume, f)
+    integer,  intent(in)    :: points(:)
+    real(wp), intent(in)    :: force       !! on all of the points [N/m]
+    real(wp), intent(in)    :: volume(:)   !! V (n) [m^2]
+    real(wp), intent(inout) :: f(:)        !! one component (n) [N/m^3]
+    real(wp) :: total, area
+    integer  :: k
+
+    total = force
+    area = 0.0_wp
+    do k = 1, size(points)
+      total = total + volume(points(k)) * f(points(k))
+      area = area + volume(points(k))
+    end do
+    do k = 1, size(points)
+      f(points(k)) = total / area
+    end do
+  end subroutine share_force
 
   !> Work of the loads from t to t_next, by the trapezoidal rule over the displacement of the step.
   pure real(wp) function load_work(pressures, boundaries, v, t, t_next) result(work)
@@ -54,13 +80,17 @@ contains
     type(boundary_t), intent(in) :: boundaries(:)
     real(wp),         intent(in) :: v(:, :)     !! v^{n+1/2} (n,2) [m/s]
     real(wp),         intent(in) :: t, t_next   !! [s]
-    integer :: c, k
+    real(wp) :: power
+    integer  :: c, k, p
 
     work = 0.0_wp
     do k = 1, size(pressures)
       associate (load => pressures(k))
-        work = work + (t_next - t) * mean_factor(load%factor) &
-          * sum(load%force * v(load%points, load%axis))
+        power = 0.0_wp
+        do p = 1, size(load%points)
+          power = power + load%force(p) * v(load%points(p), load%axis)
+        end do
+        work = work + (t_next - t) * mean_factor(load%factor) * power
       end associate
     end do
     do k = 1, size(boundaries)

@@ -21,6 +21,8 @@ module pd_observe
     real(wp) :: damping_dissipation = 0.0_wp
     real(wp) :: external_work = 0.0_wp
     real(wp) :: largest_work = 0.0_wp           !! largest |W| so far
+  contains
+    procedure :: enter
   end type ledger_t
 
   !> Numbers of one row of the history, boundary forces aside.
@@ -37,6 +39,19 @@ module pd_observe
   integer, parameter :: n_sums = 6
 
 contains
+
+  !> Add what one step has done.
+  pure subroutine enter(self, dissipated, damping, work)
+    class(ledger_t), intent(inout) :: self
+    real(wp),        intent(in)    :: dissipated   !! by plastic flow [J/m]
+    real(wp),        intent(in)    :: damping      !! dissipated by the damping [J/m]
+    real(wp),        intent(in)    :: work         !! from outside [J/m]
+
+    self%plastic_dissipation = self%plastic_dissipation + dissipated
+    self%damping_dissipation = self%damping_dissipation + damping
+    self%external_work = self%external_work + work
+    self%largest_work = max(self%largest_work, abs(self%external_work))
+  end subroutine enter
 
   !> Averages over the body without fictitious points, energies over all points.
   subroutine observe(body, solid, operators, state, ledger, seen)

@@ -1,10 +1,10 @@
 !> The state of a run: everything that changes from step to step at the points.
 module pd_state
-  use pd_kinds, only: wp
+  use pd_kinds, only: n_block, wp
   implicit none
   private
 
-  public :: state_t
+  public :: state_t, block_work_t
 
   !> Fields over all n points, fictitious ones included.
   type :: state_t
@@ -22,7 +22,34 @@ module pd_state
     procedure :: scattered
   end type state_t
 
+  !> What the blocks of points hand back in a step. Added up in the order of the blocks, it has the
+  !> same bits for any number of threads. Made once: nothing is allocated from step to step.
+  type :: block_work_t
+    real(wp), allocatable :: damping(:, :)    !! work of the damping, see `pd_verlet` (4,blocks)
+    real(wp), allocatable :: dissipated(:)    !! work of S on dE^p (blocks) [J/m]
+    integer,  allocatable :: failed(:)        !! first point with det F <= 0, 0: none (blocks)
+    real(wp), allocatable :: times(:, :)      !! clock before, between, behind kernels (3,blocks) [s]
+  contains
+    procedure :: fit
+  end type block_work_t
+
 contains
+
+  !> Make room for the blocks of points first to last.
+  subroutine fit(self, first, last)
+    class(block_work_t), intent(inout) :: self
+    integer,             intent(in)    :: first, last
+    integer :: n_blocks
+
+    n_blocks = (last - first) / n_block + 1
+    if (allocated(self%failed)) then
+      if (size(self%failed) == n_blocks) return
+      deallocate (self%damping, self%dissipated, self%failed, self%times)
+    end if
+    allocate (self%damping(4, n_blocks), self%dissipated(n_blocks), self%times(3, n_blocks), &
+      source=0.0_wp)
+    allocate (self%failed(n_blocks), source=0)
+  end subroutine fit
 
   !> The unloaded state of n points.
   subroutine allocate_state(self, n)

@@ -20,7 +20,8 @@ module pd_timing
     real(wp) :: seconds(size(kernel_names)) = 0.0_wp
     logical  :: blocks = .true.                        !! blocks are timed in this step
     real(wp), private :: last = 0.0_wp
-    real(wp), private :: part(size(kernel_names)) = 1.0_wp   !! of the blocks when last timed
+    !> Part of the time of two kernels that the first one took when blocks were last timed.
+    real(wp), private :: share(size(kernel_names)) = 0.5_wp
   contains
     procedure :: begin
     procedure :: lap
@@ -57,19 +58,20 @@ contains
     self%last = time
   end subroutine lap
 
-  !> Give the time since the last call to two kernels that ran block by block: `times` holds the
-  !> clock before, between and behind them where blocks are timed.
-  subroutine lap_blocks(self, kernels, times)
+  !> Give the time since the last call to a kernel and the one after it, which ran block by block:
+  !> `times` holds the clock before, between and behind them where blocks are timed.
+  subroutine lap_blocks(self, kernel, times)
     class(timing_t), intent(inout) :: self
-    integer,         intent(in)    :: kernels(2)
+    integer,         intent(in)    :: kernel        !! the first of the two
     real(wp),        intent(in)    :: times(:, :)   !! (3,blocks) [s]
-    real(wp) :: time
+    real(wp) :: time, share
 
-    if (self%blocks) self%part(kernels) = [sum(times(2, :) - times(1, :)), &
-      sum(times(3, :) - times(2, :))]
+    if (self%blocks) self%share(kernel) = sum(times(2, :) - times(1, :)) &
+      / max(sum(times(3, :) - times(1, :)), tiny(1.0_wp))
+    share = min(1.0_wp, max(0.0_wp, self%share(kernel)))
     time = now()
-    if (sum(self%part(kernels)) > 0.0_wp) self%seconds(kernels) = self%seconds(kernels) &
-      + (time - self%last) * self%part(kernels) / sum(self%part(kernels))
+    self%seconds(kernel) = self%seconds(kernel) + share * (time - self%last)
+    self%seconds(kernel + 1) = self%seconds(kernel + 1) + (1.0_wp - share) * (time - self%last)
     self%last = time
   end subroutine lap_blocks
 

@@ -7,10 +7,11 @@
 !> Source: doc/theory.md, section 6.
 module pd_verlet
   use pd_kinds, only: block_sum, n_block, wp
+  use pd_state, only: block_work_t
   implicit none
   private
 
-  public :: motion_t, frame_t, kick_and_drift, kick, reference_velocity
+  public :: motion_t, frame_t, kick_and_drift, kick, kick_twice_and_drift, reference_velocity
 
   !> Constants of the motion.
   type :: motion_t
@@ -54,7 +55,7 @@ contains
   !>
   !> `work`: half a step's work of the damping force C (v - v_ref): (1) on v - v_ref: dissipated,
   !> (2) of the force -C (v - v_ref) on v_ref: done by whoever moves the frame.
-  subroutine kick_and_drift(motion, frame, position, volume, free, f, v, u, work)
+  subroutine kick_and_drift(motion, frame, position, volume, free, f, v, u, blocks, work)
     type(motion_t), intent(in)    :: motion
     type(frame_t),  intent(in)    :: frame            !! at step n
     real(wp),       intent(in), contiguous :: position(:, :)   !! X (n,2) [m]
@@ -63,25 +64,76 @@ contains
     real(wp),       intent(in), contiguous :: f(:, :)          !! f^n (n,2) [N/m^3]
     real(wp),       intent(inout), contiguous :: v(:, :)          !! v^n -> v^{n+1/2} (n,2) [m/s]
     real(wp),       intent(inout), contiguous :: u(:, :)          !! u^n -> u^{n+1} (n,2) [m]
+    type(block_work_t), intent(inout) :: blocks
     real(wp),       intent(out)   :: work(2)          !! [J/m]
-    real(wp), allocatable :: work_in(:, :)
-    integer :: block, n_blocks, lo, last
 
-    last = min(motion%last, size(volume))
-    n_blocks = (last - motion%first) / n_block + 1
-    allocate (work_in(2, n_blocks))
-    !$omp parallel do schedule(static) default(none) private(block, lo) &
-    !$omp shared(n_blocks, last, motion, frame, position, volume, free, f, v, u, work_in)
-    do block = 1, n_blocks
-      lo = motion%first + (block - 1) * n_block
-      call kick_and_drift_block(lo, min(lo + n_block - 1, last), motion, frame, &
-        position(:, motion%axis), volume, free, f, v, u, work_in(:, block))
-    end do
-    !$omp end parallel do
-    work = sum(work_in, dim=2)
+    call move_points(motion, [.false., .true.], frame, position, volume, free, f, v, u, blocks)
+    work = sum(blocks%damping(3:4, :), dim=2)
   end subroutine kick_and_drift
 
-  !> The same for points lo to hi.
+  !> Second half kick; `work` as in `kick_and_drift`.
+  subroutine kick(motion, frame, position, volume, free, f, v, u, blocks, work)
+    type(motion_t), intent(in)    :: motion
+    type(frame_t),  intent(in)    :: frame            !! at step n+1
+    real(wp),       intent(in), contiguous :: position(:, :)   !! X (n,2) [m]
+    real(wp),       intent(in), contiguous :: volume(:)        !! V (n) [m^2]
+    real(wp),       intent(in), contiguous :: free(:, :)       !! 1: free, 0: prescribed (n,2)
+    real(wp),       intent(in), contiguous :: f(:, :)          !! f^{n+1} (n,2) [N/m^3]
+    real(wp),       intent(inout), contiguous :: v(:, :)          !! v^{n+1/2} -> v^{n+1} [m/s]
+    real(wp),       intent(inout), contiguous :: u(:, :)          !! stays
+    type(block_work_t), intent(inout) :: blocks
+    real(wp),       intent(out)   :: work(2)          !! [J/m]
+
+    call move_points(motion, [.true., .false.], frame, position, volume, free, f, v, u, blocks)
+    work = sum(blocks%damping(1:2, :), dim=2)
+  end subroutine kick
+
+  !> Second half kick of a step, first half kick and drift of the next: the same as `kick` and
+  !> `kick_and_drift`, bit by bit, with one way through the memory. `work` is that of both.
+  subroutine kick_twice_and_drift(motion, frame, position, volume, free, f, v, u, blocks, &
+    second_work, first_work)
+    type(motion_t), intent(in)    :: motion
+    type(frame_t),  intent(in)    :: frame            !! at the end of the one, where the next begins
+    real(wp),       intent(in), contiguous :: position(:, :)   !! X (n,2) [m]
+    real(wp),       intent(in), contiguous :: volume(:)        !! V (n) [m^2]
+    real(wp),       intent(in), contiguous :: free(:, :)       !! 1: free, 0: prescribed (n,2)
+    real(wp),       intent(in), contiguous :: f(:, :)          !! f^n (n,2) [N/m^3]
+    real(wp),       intent(inout), contiguous :: v(:, :)          !! v^{n-1/2} -> v^{n+1/2} [m/s]
+    real(wp),       intent(inout), contiguous :: u(:, :)          !! u^n -> u^{n+1} (n,2) [m]
+    type(block_work_t), intent(inout) :: blocks
+    real(wp),       intent(out)   :: second_work(2), first_work(2)   !! [J/m]
+
+    call move_points(motion, [.true., .true.], frame, position, volume, free, f, v, u, blocks)
+    second_work = sum(blocks%damping(1:2, :), dim=2)
+    first_work = sum(blocks%damping(3:4, :), dim=2)
+  end subroutine kick_twice_and_drift
+
+  !> The second half kick of a step, the first half kick and the drift of the next, or both.
+  subroutine move_points(motion, which, frame, position, volume, free, f, v, u, blocks)
+    type(motion_t), intent(in)    :: motion
+    logical,        intent(in)    :: which(2)         !! what ends a step, what begins the next
+    type(frame_t),  intent(in)    :: frame
+    real(wp),       intent(in), contiguous :: position(:, :), volume(:), free(:, :), f(:, :)
+    real(wp),       intent(inout), contiguous :: v(:, :), u(:, :)
+    type(block_work_t), intent(inout) :: blocks       !! damping: of the one and of the other
+    integer :: block, lo, hi, last
+
+    last = min(motion%last, size(volume))
+    call blocks%fit(motion%first, last)
+    !$omp parallel do schedule(static) default(none) private(block, lo, hi) &
+    !$omp shared(last, motion, which, frame, position, volume, free, f, v, u, blocks)
+    do block = 1, size(blocks%failed)
+      lo = motion%first + (block - 1) * n_block
+      hi = min(lo + n_block - 1, last)
+      if (which(1)) call kick_block(lo, hi, motion, frame, position(:, motion%axis), volume, &
+        free, f, v, blocks%damping(1:2, block))
+      if (which(2)) call kick_and_drift_block(lo, hi, motion, frame, position(:, motion%axis), &
+        volume, free, f, v, u, blocks%damping(3:4, block))
+    end do
+    !$omp end parallel do
+  end subroutine move_points
+
+  !> First half kick and drift of points lo to hi.
   pure subroutine kick_and_drift_block(lo, hi, motion, frame, x, volume, free, f, v, u, work)
     integer,        intent(in)    :: lo, hi
     type(motion_t), intent(in)    :: motion
@@ -99,8 +151,10 @@ contains
     c = motion%damping
     half = 0.5_wp * dt / motion%density
     call frame_constants(motion, frame, lower1, lower2, slope1, slope2, start, length)
-    drag_work = 0.0_wp
-    frame_work = 0.0_wp
+    if (hi - lo + 1 < n_block) then   ! sums go over whole blocks
+      drag_work = 0.0_wp
+      frame_work = 0.0_wp
+    end if
     !$omp simd simdlen(8) private(b, place, ref1, ref2, drag1, drag2)
     do i = lo, hi
       b = i - lo + 1
@@ -120,34 +174,7 @@ contains
     work(2) = 0.5_wp * dt * block_sum(frame_work)
   end subroutine kick_and_drift_block
 
-  !> Second half kick; `work` as in `kick_and_drift`.
-  subroutine kick(motion, frame, position, volume, free, f, v, work)
-    type(motion_t), intent(in)    :: motion
-    type(frame_t),  intent(in)    :: frame            !! at step n+1
-    real(wp),       intent(in), contiguous :: position(:, :)   !! X (n,2) [m]
-    real(wp),       intent(in), contiguous :: volume(:)        !! V (n) [m^2]
-    real(wp),       intent(in), contiguous :: free(:, :)       !! 1: free, 0: prescribed (n,2)
-    real(wp),       intent(in), contiguous :: f(:, :)          !! f^{n+1} (n,2) [N/m^3]
-    real(wp),       intent(inout), contiguous :: v(:, :)          !! v^{n+1/2} -> v^{n+1} [m/s]
-    real(wp),       intent(out)   :: work(2)          !! [J/m]
-    real(wp), allocatable :: work_in(:, :)
-    integer :: block, n_blocks, lo, last
-
-    last = min(motion%last, size(volume))
-    n_blocks = (last - motion%first) / n_block + 1
-    allocate (work_in(2, n_blocks))
-    !$omp parallel do schedule(static) default(none) private(block, lo) &
-    !$omp shared(n_blocks, last, motion, frame, position, volume, free, f, v, work_in)
-    do block = 1, n_blocks
-      lo = motion%first + (block - 1) * n_block
-      call kick_block(lo, min(lo + n_block - 1, last), motion, frame, &
-        position(:, motion%axis), volume, free, f, v, work_in(:, block))
-    end do
-    !$omp end parallel do
-    work = sum(work_in, dim=2)
-  end subroutine kick
-
-  !> The same for points lo to hi.
+  !> Second half kick of points lo to hi.
   pure subroutine kick_block(lo, hi, motion, frame, x, volume, free, f, v, work)
     integer,        intent(in)    :: lo, hi
     type(motion_t), intent(in)    :: motion
@@ -165,8 +192,10 @@ contains
     half = 0.5_wp * motion%time_step / motion%density
     slow_down = 1.0_wp / (1.0_wp + half * c)
     call frame_constants(motion, frame, lower1, lower2, slope1, slope2, start, length)
-    drag_work = 0.0_wp
-    frame_work = 0.0_wp
+    if (hi - lo + 1 < n_block) then   ! sums go over whole blocks
+      drag_work = 0.0_wp
+      frame_work = 0.0_wp
+    end if
     !$omp simd simdlen(8) private(b, place, ref1, ref2, drag1, drag2, half1, half2)
     do i = lo, hi
       b = i - lo + 1

@@ -23,12 +23,18 @@ program perigeo
   use pd_setup, only: find_highest_frequency, model_t, set_up_body, set_up_model, &
     set_up_schedule, start
   use pd_state, only: state_t
-  use pd_step, only: take_step
+  use pd_step, only: step_work_t, take_step
   use pd_summary, only: estimated_seconds, summarise, summary_t
   use pd_system, only: catch_signals, exit_program, pending_signal, sigint
   use pd_timing, only: kernel_names, timing_t
   use pd_version, only: code_version, git_hash
   implicit none
+
+  !> What is written after a step. Known before it: only then has its state to be whole.
+  type :: due_t
+    logical :: row = .false., frame = .false., checkpoint = .false.
+    logical :: stop = .false.   ! a signal came
+  end type due_t
 
   type(options_t)    :: options
   type(input_t)      :: input
@@ -40,9 +46,9 @@ program perigeo
   type(timing_t)     :: timing
   type(checkpoint_t) :: checkpoint
   type(error_list_t) :: errors, warnings
-  real(wp), allocatable :: a(:, :)   ! A = P K^-1 (n,4)
+  type(step_work_t)  :: work
   integer :: step, failed_point
-  logical :: stopping = .false.   ! a signal came, and its checkpoint is written
+  type(due_t) :: due
   integer(int64) :: last_checkpoint, loop_start
 
   call read_command_line(options, errors)
@@ -55,10 +61,12 @@ program perigeo
   loop_start = last_checkpoint
 
   do step = checkpoint%step + 1, schedule%steps
-    call take_step(step, model, state, a, ledger, timing, failed_point)
+    due = due_after(step)
+    call take_step(step, due%row .or. due%frame .or. due%checkpoint, model, state, work, ledger, &
+      timing, failed_point)
     if (failed_point > 0) call fail('det F is not positive, or not a number')
     call write_what_is_due()
-    if (stopping) call interrupt()
+    if (due%stop) call interrupt()
   end do
   call finish()
 
@@ -120,7 +128,7 @@ contains
       call exit_program(exit_ok)
     end if
 
-    allocate (a(model%body%n, 4), source=0.0_wp)   ! voids stay zero
+    allocate (work%a(model%body%n, 4), source=0.0_wp)   ! voids stay zero
     if (checkpoint%history_rows > 0) then
       state = state%scattered(model%body%points, model%body%n)
       call boundary_forces(model%body%position, model%body%volume, checkpoint%time, &
@@ -191,23 +199,28 @@ contains
     call stop_if_any(errors, exit_file)
   end subroutine open_outputs
 
-  !> Row, frames, checkpoint and progress after a step. Before anything of a state is kept it is
-  !> looked at: a run that gains energy has failed.
-  subroutine write_what_is_due()
+  !> What is due after a step. A signal that comes during the step is met after the next one.
+  type(due_t) function due_after(step) result(due)
+    integer, intent(in) :: step
     integer(int64) :: now, rate
-    logical :: row, frame, save_state
-    integer :: k
 
-    row = row_due(schedule, step)
-    frame = any(schedule%frame_steps == step)
-    stopping = pending_signal() /= 0
-    save_state = stopping
+    due%row = row_due(schedule, step)
+    due%frame = any(schedule%frame_steps == step)
+    due%stop = pending_signal() /= 0
+    due%checkpoint = due%stop
     if (input%output%checkpoint_every > 0.0_wp) then
       call system_clock(now, rate)
-      save_state = save_state .or. step == schedule%steps .or. &
+      due%checkpoint = due%checkpoint .or. step == schedule%steps .or. &
         real(now - last_checkpoint, wp) >= input%output%checkpoint_every * real(rate, wp)
     end if
-    if (row .or. frame .or. save_state) then
+  end function due_after
+
+  !> Write what is due. Before anything of a state is kept it is looked at: a run that gains energy
+  !> has failed.
+  subroutine write_what_is_due()
+    integer :: k
+
+    if (due%row .or. due%frame .or. due%checkpoint) then
       call observe_state(model, state, ledger, record)
       ! After the first step from rest loads have given half a kick, and no work has been done yet.
       if (step > 1 .and. running_away(record%seen, ledger)) then
@@ -216,13 +229,13 @@ contains
       end if
     end if
 
-    if (row) call record_row(model, state, step, record, errors)
-    if (frame) then
+    if (due%row) call record_row(model, state, step, record, errors)
+    if (due%frame) then
       do k = 1, size(schedule%frame_steps)
         if (schedule%frame_steps(k) == step) call record_frame(model, state, step, record, errors)
       end do
     end if
-    if (save_state) then
+    if (due%checkpoint) then
       call save_checkpoint(model, state, ledger, step, record, errors)
       call system_clock(last_checkpoint)
     end if

@@ -9,7 +9,7 @@ module samples
   use pd_j2, only: new_j2
   use pd_kinds, only: wp
   use pd_kinematics, only: inverse_shape_tensor
-  use pd_state, only: state_t
+  use pd_state, only: block_work_t, state_t
   use pd_timing, only: timing_t
   implicit none
   private
@@ -195,14 +195,14 @@ contains
     real(wp), intent(out), optional :: dissipated
     integer,  intent(out), optional :: failed
     real(wp), allocatable :: a(:, :)
+    type(block_work_t) :: blocks
     type(timing_t) :: timing
-    real(wp) :: work
-    integer  :: first
+    integer :: first
 
     allocate (a(size(volume), 4))
-    call force_state(operators, solid, volume, state, a, timing, work, first)
-    call force_of(operators, solid, state%displacement, a, state%force, timing)
-    if (present(dissipated)) dissipated = work
+    call force_state(operators, solid, volume, state, a, blocks, timing, first)
+    call force_of(operators, solid, state%displacement, a, state%force, blocks, timing)
+    if (present(dissipated)) dissipated = sum(blocks%dissipated)
     if (present(failed)) failed = first
   end subroutine internal_force
 
