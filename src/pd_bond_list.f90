@@ -213,10 +213,9 @@ contains
   end subroutine divergence_block
 
   !> f <- f + Z[u] for points lo to hi: the bond part of the zero-energy control.
-  pure subroutine control_block(self, lo, hi, c, u, f)
+  pure subroutine control_block(self, lo, hi, u, f)
     class(bond_list_t), intent(in)    :: self
     integer,  intent(in) :: lo, hi
-    real(wp), intent(in),    contiguous :: c(:)      !! (n) [N/m^6]
     real(wp), intent(in),    contiguous :: u(:, :)   !! (n,2) [m]
     real(wp), intent(inout), contiguous :: f(:, :)   !! (n,2) [N/m^3]
     integer     :: i, j
@@ -228,7 +227,7 @@ contains
       fy = 0.0_wp
       do b = self%first(i), self%first(i + 1) - 1
         j = self%neighbour(b)
-        weight = self%weight(b) * (c(i) + c(j))
+        weight = self%weight(b) * (self%control(i) + self%control(j))
         fx = fx + weight * (u(j, 1) - u(i, 1))
         fy = fy + weight * (u(j, 2) - u(i, 2))
       end do
@@ -311,6 +310,7 @@ contains
     class(bond_list_t), intent(in) :: self
 
     memory = real(self%bonds(), wp) * 28.0_wp + real(self%n, wp) * 32.0_wp
+    if (allocated(self%control)) memory = memory + real(self%n, wp) * 8.0_wp
   end function memory
 
 end module pd_bond_list

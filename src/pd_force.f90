@@ -21,7 +21,6 @@ module pd_force
     real(wp) :: density = 0.0_wp                !! rho [kg/m^3]
     real(wp), allocatable :: k_inverse(:, :)    !! K^-1 (n,3) xx yy xy [1/m^4]
     real(wp), allocatable :: yield_stress(:)    !! sigma_y0 (n) [Pa]
-    real(wp), allocatable :: control(:)         !! c (n) [N/m^6]; not allocated: no control
   end type solid_t
 
 contains
@@ -54,7 +53,7 @@ contains
     integer :: block, lo, hi
 
     call blocks%fit(operators%first_point, operators%last_point)
-    call operators%weigh_displacement(state%displacement, solid%control)
+    call operators%weigh_displacement(state%displacement)
     !$omp parallel do schedule(static) default(none) private(block, lo, hi) &
     !$omp shared(operators, solid, volume, state, a, blocks, timing)
     do block = 1, size(blocks%failed)
@@ -66,6 +65,8 @@ contains
       call deformation_gradient_block(lo, hi, solid%k_inverse, state%deformation_gradient)
       call force_state_of_block(lo, hi, solid, volume, state, a, blocks%dissipated(block), &
         blocks%failed(block))
+      if (allocated(operators%control)) call subtract_affine_control(lo, hi, &
+        operators%control, state%deformation_gradient, a)
       call operators%weigh_block(lo, hi, a)
       if (timing%blocks) blocks%times(3, block) = now()
     end do
@@ -78,9 +79,8 @@ contains
   end subroutine force_state
 
   !> A gives f, with the zero-energy control.
-  subroutine internal_force(operators, solid, u, a, f, blocks, timing)
+  subroutine internal_force(operators, u, a, f, blocks, timing)
     class(operators_t), intent(in) :: operators
-    type(solid_t),  intent(in)    :: solid
     real(wp),       intent(in),    contiguous :: u(:, :)   !! (n,2) [m]
     real(wp),       intent(in),    contiguous :: a(:, :)   !! A (n,4), weighed [N/m^6]
     real(wp),       intent(inout), contiguous :: f(:, :)   !! out: (n,2) [N/m^3]
@@ -90,14 +90,14 @@ contains
 
     call blocks%fit(operators%first_point, operators%last_point)
     !$omp parallel do schedule(static) default(none) private(block, lo, hi) &
-    !$omp shared(operators, solid, u, a, f, blocks, timing)
+    !$omp shared(operators, u, a, f, blocks, timing)
     do block = 1, size(blocks%failed)
       lo = operators%first_point + (block - 1) * n_block
       hi = min(lo + n_block - 1, operators%last_point)
       if (timing%blocks) blocks%times(1, block) = now()
       call operators%divergence_block(lo, hi, a, f)
       if (timing%blocks) blocks%times(2, block) = now()
-      if (allocated(solid%control)) call operators%control_block(lo, hi, solid%control, u, f)
+      if (allocated(operators%control)) call operators%control_block(lo, hi, u, f)
       if (timing%blocks) blocks%times(3, block) = now()
     end do
     !$omp end parallel do
@@ -122,8 +122,6 @@ contains
     call stress_block(solid%material, lo, hi, solid%yield_stress, volume, strain, state, &
       dissipated)
     call force_state_block(lo, hi, state%deformation_gradient, state%stress, solid%k_inverse, a)
-    if (allocated(solid%control)) &
-      call subtract_affine_control(lo, hi, solid%control, state%deformation_gradient, a)
   end subroutine force_state_of_block
 
   !> The first of the points lo to hi whose det F is not positive (NaN included); 0: none.
@@ -174,7 +172,7 @@ contains
     type(timing_t) :: timing
     integer :: lo, hi
 
-    call operators%weigh_displacement(u, solid%control)
+    call operators%weigh_displacement(u)
     !$omp parallel do schedule(static) default(none) private(lo, hi) &
     !$omp shared(operators, solid, u, h, a)
     do lo = operators%first_point, operators%last_point, n_block
@@ -182,10 +180,12 @@ contains
       call operators%gradient_block(lo, hi, u, h)
       call deformation_gradient_block(lo, hi, solid%k_inverse, h)
       call linear_force_state_block(lo, hi, solid, h, a)
+      if (allocated(operators%control)) &
+        call subtract_affine_control(lo, hi, operators%control, h, a)
       call operators%weigh_block(lo, hi, a)
     end do
     !$omp end parallel do
-    call internal_force(operators, solid, u, a, f, blocks, timing)
+    call internal_force(operators, u, a, f, blocks, timing)
   end subroutine linear_force
 
   !> A of a small displacement of points lo to hi, from F.
@@ -209,7 +209,6 @@ contains
         a(i, 4) = stress(b, 4) * k(i, 3) + stress(b, 2) * k(i, 2)
       end do
     end associate
-    if (allocated(solid%control)) call subtract_affine_control(lo, hi, solid%control, f, a)
   end subroutine linear_force_state_block
 
 end module pd_force

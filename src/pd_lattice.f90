@@ -28,13 +28,15 @@ module pd_lattice
     integer, private :: fewest = 0, poorest = 0           !! bonds of any point, and the first such
     integer(i8), private :: n_bonds = 0                   !! directed
     type(columns_t), private :: columns
-    real(wp), private :: own_weight = 0.0_wp              !! omega V_0 of a bond of length zero [m^2]
+    real(wp), private :: own_weight = 0.0_wp              !! omega V_0 of bond length 0 [m^2]
     integer,  allocatable, private :: shift(:)            !! (pairs)
     real(wp), allocatable, private :: xi(:, :)            !! (pairs,2) [m]
     real(wp), allocatable, private :: weight(:)           !! omega V_0 (pairs) [m^2]
     real(wp), allocatable, private :: moment(:, :)        !! s (n,2) [m^3]
     real(wp), allocatable, private :: weighed_moment(:, :)   !! s over the share (n,2) [m^3]
+    real(wp), allocatable, private :: held(:)             !! sum_j omega V_j (c_i + c_j) (n) [N/m^4]
   contains
+    procedure :: set_control
     procedure :: gradient_block
     procedure :: divergence_block
     procedure :: control_block
@@ -81,7 +83,6 @@ contains
     operators%weight = operators%weight(:k)
     operators%columns = columns_of(horizon, spacing, stride, reach)
     operators%own_weight = influence(horizon, 0.0_wp) * spacing**2
-    operators%pulls = .true.
 
     allocate (operators%share(operators%n))
     operators%share = volume / spacing**2
@@ -254,54 +255,65 @@ contains
     end do
   end subroutine add_own_part
 
-  !> f <- f + Z[u] for points lo to hi.
-  !>
-  !>   Z_i = c_i L[u~]_i + L[c u~]_i - u_i (c_i L[share]_i + L[c share]_i)
-  !>
-  !> Each L contains the point itself; its terms cancel. c u~ and c share are kept by
-  !> `weigh_displacement`.
-  pure subroutine control_block(self, lo, hi, c, u, f)
+  !> Stiffness of the control, and what it takes of it whatever u is:
+  !> held = c L[share] + L[c share], L by columns, with the point itself.
+  subroutine set_control(self, c)
+    class(lattice_operators_t), intent(inout) :: self
+    real(wp), intent(in), contiguous :: c(:)   !! (n) [N/m^6]; voids: 0
+    real(wp), allocatable :: shared(:)
+    integer :: lo, hi
+
+    self%control = c
+    shared = self%share * c
+    if (.not. allocated(self%pull)) allocate (self%pull(self%n, 2), source=0.0_wp)
+    if (.not. allocated(self%held)) allocate (self%held(self%n), source=0.0_wp)
+    !$omp parallel do schedule(static) default(none) shared(self, c, shared) private(lo, hi)
+    do lo = self%first_point, self%last_point, n_block
+      hi = min(lo + n_block - 1, self%last_point)
+      self%held(lo:hi) = c(lo:hi) * (self%weight_sum(lo:hi) + self%own_weight * self%share(lo:hi))
+      call add_sums(self%columns, self%columns%l, lo, hi, shared, self%held(lo:hi))
+    end do
+    !$omp end parallel do
+  end subroutine set_control
+
+  !> f <- f + Z[u] for points lo to hi: Z_i = c_i L[u~]_i + L[c u~]_i - held_i u_i. Each L contains
+  !> the point itself; these terms cancel.
+  pure subroutine control_block(self, lo, hi, u, f)
     class(lattice_operators_t), intent(in) :: self
     integer,  intent(in) :: lo, hi
-    real(wp), intent(in),    contiguous :: c(:)      !! (n) [N/m^6]
     real(wp), intent(in),    contiguous :: u(:, :)   !! (n,2) [m]
     real(wp), intent(inout), contiguous :: f(:, :)   !! (n,2) [N/m^3]
 
     if (self%weighs) then
-      call control_of_shares(self, lo, hi, c, self%weighed, u, f)
+      call control_of_shares(self, lo, hi, self%weighed, u, f)
     else
-      call control_of_shares(self, lo, hi, c, u, u, f)
+      call control_of_shares(self, lo, hi, u, u, f)
     end if
   end subroutine control_block
 
   !> The same from u~ and u.
-  pure subroutine control_of_shares(self, lo, hi, c, w, u, f)
+  pure subroutine control_of_shares(self, lo, hi, w, u, f)
     class(lattice_operators_t), intent(in) :: self
     integer,  intent(in) :: lo, hi
-    real(wp), intent(in),    contiguous :: c(:)      !! (n) [N/m^6]
     real(wp), intent(in),    contiguous :: w(:, :)   !! u~ (n,2) [m]
     real(wp), intent(in),    contiguous :: u(:, :)   !! (n,2) [m]
     real(wp), intent(inout), contiguous :: f(:, :)   !! (n,2) [N/m^3]
-    real(wp) :: held(n_block), near(n_block), pulled(n_block)
+    real(wp) :: near(n_block)
     integer  :: i, b, n, k
 
     n = hi - lo + 1
-    held = 0.0_wp
-    call add_sums(self%columns, self%columns%l, lo, hi, self%pull(:, 3), held(:n))
-    !$omp simd simdlen(8) private(b)
-    do i = lo, hi
-      b = i - lo + 1
-      held(b) = held(b) + c(i) * (self%weight_sum(i) + self%own_weight * self%share(i))
-    end do
     do k = 1, 2
       near = 0.0_wp
-      pulled = 0.0_wp
       call add_sums(self%columns, self%columns%l, lo, hi, w(:, k), near(:n))
-      call add_sums(self%columns, self%columns%l, lo, hi, self%pull(:, k), pulled(:n))
       !$omp simd simdlen(8) private(b)
       do i = lo, hi
         b = i - lo + 1
-        f(i, k) = f(i, k) + ((c(i) * near(b) + pulled(b)) - held(b) * u(i, k))
+        near(b) = self%control(i) * near(b) - self%held(i) * u(i, k)
+      end do
+      call add_sums(self%columns, self%columns%l, lo, hi, self%pull(:, k), near(:n))
+      !$omp simd simdlen(8)
+      do i = lo, hi
+        f(i, k) = f(i, k) + near(i - lo + 1)
       end do
     end do
   end subroutine control_of_shares
@@ -401,7 +413,7 @@ contains
 
     memory = real(self%n, wp) * 32.0_wp
     if (self%weighs) memory = memory + real(self%n, wp) * 32.0_wp
-    if (allocated(self%pull)) memory = memory + real(self%n, wp) * 24.0_wp
+    if (allocated(self%control)) memory = memory + real(self%n, wp) * 32.0_wp
   end function memory
 
 end module pd_lattice

@@ -57,7 +57,7 @@ contains
   subroutine observe(body, solid, operators, state, ledger, seen)
     type(body_t),        intent(in)  :: body
     type(solid_t),       intent(in)  :: solid
-    class(operators_t),  intent(in)  :: operators
+    class(operators_t),  intent(inout) :: operators   !! their work space alone
     type(state_t),       intent(in)  :: state
     type(ledger_t),      intent(in)  :: ledger
     type(observation_t), intent(out) :: seen
@@ -82,7 +82,7 @@ contains
     seen%mean_strain_yy = sums(4) / sums(1)
     seen%strain_energy = sums(5)
     seen%kinetic_energy = sums(6)
-    seen%stabilisation_energy = control_energy(body, solid, operators, state)
+    call control_energy(body, solid, operators, state, seen%stabilisation_energy)
     seen%plastic_dissipation = ledger%plastic_dissipation
     seen%damping_dissipation = ledger%damping_dissipation
     seen%external_work = ledger%external_work
@@ -157,21 +157,66 @@ contains
   end function largest_of_block
 
   !> Energy of the control: with constant c it has a potential, (1/2) sum V c sum omega V_j |z|^2,
-  !> which is the work of the control forces without the error of adding it up.
-  real(wp) function control_energy(body, solid, operators, state) result(energy)
-    type(body_t),      intent(in) :: body
-    type(solid_t),     intent(in) :: solid
-    class(operators_t), intent(in) :: operators
-    type(state_t),     intent(in) :: state
-    real(wp), allocatable :: z2(:)
+  !> which is the work of the control forces without the error of adding it up. The force is linear
+  !> in u, so this is half of the force times u:
+  !>
+  !>   -(1/2) sum_i V_i (u_i - u_mean) . Z[u]_i - (1/2) sum_i V_i c_i H_i : H_i K_i,   H = F - I
+  !>
+  !> The mean adds nothing, for the forces are in balance; without it digits of u would be lost.
+  subroutine control_energy(body, solid, operators, state, energy)
+    type(body_t),       intent(in)    :: body
+    type(solid_t),      intent(in)    :: solid
+    class(operators_t), intent(inout) :: operators
+    type(state_t),      intent(in)    :: state
+    real(wp),           intent(out)   :: energy   !! [J/m]; round-off does not make it negative
+    real(wp), allocatable :: z(:, :), energy_of(:)
+    real(wp) :: mean(2)
+    integer  :: block, n_blocks
 
     energy = 0.0_wp
-    if (.not. allocated(solid%control)) return
-    allocate (z2(body%n))
-    call operators%zero_energy_squared(state%displacement, &
-      state%deformation_gradient, z2)
-    energy = 0.5_wp * sum(body%volume * solid%control * z2)
-  end function control_energy
+    if (.not. allocated(operators%control)) return
+    n_blocks = (body%n + n_block - 1) / n_block
+    allocate (energy_of(n_blocks))
+    allocate (z(body%n, 2), source=0.0_wp)
+    call operators%add_control(state%displacement, z)
+    mean = matmul(body%volume, state%displacement) / sum(body%volume)
+    !$omp parallel do schedule(static) default(none) private(block) &
+    !$omp shared(n_blocks, body, solid, operators, state, z, mean, energy_of)
+    do block = 1, n_blocks
+      energy_of(block) = control_energy_of_block((block - 1) * n_block + 1, &
+        min(block * n_block, body%n), body%volume, operators%control, solid%k_inverse, &
+        state%deformation_gradient, state%displacement, mean, z)
+    end do
+    !$omp end parallel do
+    energy = max(0.0_wp, sum(energy_of))
+  end subroutine control_energy
+
+  !> The same for points lo to hi.
+  pure real(wp) function control_energy_of_block(lo, hi, volume, c, k_inverse, f, u, mean, z) &
+    result(energy)
+    integer,  intent(in) :: lo, hi
+    real(wp), intent(in), contiguous :: volume(:), c(:), k_inverse(:, :), f(:, :), u(:, :), z(:, :)
+    real(wp), intent(in) :: mean(2)   !! of u [m]
+    real(wp) :: terms(n_block), determinant_of_k, kxx, kyy, kxy, hxx, hyy
+    integer  :: i
+
+    if (hi - lo + 1 < n_block) terms = 0.0_wp   ! sums go over whole blocks
+    !$omp simd simdlen(8) private(determinant_of_k, kxx, kyy, kxy, hxx, hyy)
+    do i = lo, hi
+      ! voids have K^-1 = 0 and c = 0: the quotients stay finite
+      determinant_of_k = 1.0_wp / max(k_inverse(i, 1) * k_inverse(i, 2) - k_inverse(i, 3)**2, &
+        tiny(1.0_wp))
+      kxx = k_inverse(i, 2) * determinant_of_k
+      kyy = k_inverse(i, 1) * determinant_of_k
+      kxy = -k_inverse(i, 3) * determinant_of_k
+      hxx = f(i, 1) - 1.0_wp
+      hyy = f(i, 4) - 1.0_wp
+      terms(i - lo + 1) = -0.5_wp * volume(i) * ((u(i, 1) - mean(1)) * z(i, 1) &
+        + (u(i, 2) - mean(2)) * z(i, 2) + c(i) * (kxx * (hxx**2 + f(i, 3)**2) &
+        + kyy * (f(i, 2)**2 + hyy**2) + 2.0_wp * kxy * (hxx * f(i, 2) + f(i, 3) * hyy)))
+    end do
+    energy = block_sum(terms)
+  end function control_energy_of_block
 
   !> Energy that came from nowhere [J/m].
   pure real(wp) function surplus(seen, ledger)

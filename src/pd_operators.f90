@@ -26,14 +26,15 @@ module pd_operators
     integer :: first_point = 1, last_point = 0   !! between which all points lie that are no voids
     real(wp), allocatable :: weight_sum(:)       !! W_i = sum_j omega V_j (n) [m^2]; voids: 1
     logical :: weighs = .false.                  !! fields are weighed with the share
-    logical :: pulls = .false.                   !! control takes sums of c u and c, not bonds
     real(wp), allocatable :: share(:)            !! part of a whole cell that a point owns (n)
-    real(wp), allocatable :: weighed(:, :)       !! share times u, for the blocks of G and Z (n,2) [m]
-    real(wp), allocatable :: pull(:, :)          !! share times c u_x, c u_y, c (n,3) [N/m^5, N/m^6]
+    real(wp), allocatable :: weighed(:, :)       !! share u, for blocks of G and Z (n,2) [m]
+    real(wp), allocatable :: control(:)          !! c (n) [N/m^6]; not allocated: no control
+    real(wp), allocatable :: pull(:, :)          !! share times c u (n,2) [N/m^5]; where Z needs it
   contains
     procedure(gradient_of), deferred :: gradient_block
     procedure(divergence_of), deferred :: divergence_block
     procedure(control_of), deferred :: control_block
+    procedure :: set_control
     procedure :: weigh_displacement
     procedure :: weigh_block
     procedure :: gradient
@@ -64,12 +65,11 @@ module pd_operators
       real(wp), intent(inout), contiguous :: f(:, :)   !! out: (n,2) [N/m^3]
     end subroutine divergence_of
     !> f <- f + Z[u] for points lo to hi: the bond part of the zero-energy control. Its affine part
-    !> belongs to A.
-    pure subroutine control_of(self, lo, hi, c, u, f)
+    !> belongs to A. u has been weighed.
+    pure subroutine control_of(self, lo, hi, u, f)
       import :: operators_t, wp
       class(operators_t), intent(in) :: self
       integer,  intent(in) :: lo, hi
-      real(wp), intent(in),    contiguous :: c(:)      !! (n) [N/m^6]
       real(wp), intent(in),    contiguous :: u(:, :)   !! (n,2) [m]
       real(wp), intent(inout), contiguous :: f(:, :)   !! (n,2) [N/m^3]
     end subroutine control_of
@@ -108,20 +108,23 @@ module pd_operators
 
 contains
 
+  !> Stiffness of the zero-energy control, from now on.
+  subroutine set_control(self, c)
+    class(operators_t), intent(inout) :: self
+    real(wp), intent(in), contiguous  :: c(:)   !! (n) [N/m^6]; voids: 0
+
+    self%control = c
+  end subroutine set_control
+
   !> Keep u for the blocks of G and Z, weighed with what the points own and, where Z needs it, with
   !> the stiffness of the control.
-  subroutine weigh_displacement(self, u, c)
+  subroutine weigh_displacement(self, u)
     class(operators_t), intent(inout) :: self
-    real(wp), intent(in), contiguous  :: u(:, :)       !! (n,2) [m]
-    real(wp), intent(in), contiguous, optional :: c(:) !! (n) [N/m^6]; voids: 0; without control: absent
+    real(wp), intent(in), contiguous  :: u(:, :)   !! (n,2) [m]
     integer :: i
-    logical :: pulls
 
-    pulls = self%pulls .and. present(c)
-    if (self%weighs .and. .not. allocated(self%weighed)) &
-      allocate (self%weighed(self%n, 2), source=0.0_wp)
-    if (pulls .and. .not. allocated(self%pull)) allocate (self%pull(self%n, 3), source=0.0_wp)
     if (self%weighs) then
+      if (.not. allocated(self%weighed)) allocate (self%weighed(self%n, 2), source=0.0_wp)
       !$omp parallel do simd schedule(static) default(none) shared(self, u) private(i)
       do i = self%first_point, self%last_point
         self%weighed(i, 1) = self%share(i) * u(i, 1)
@@ -129,12 +132,11 @@ contains
       end do
       !$omp end parallel do simd
     end if
-    if (pulls) then
-      !$omp parallel do simd schedule(static) default(none) shared(self, u, c) private(i)
+    if (allocated(self%pull)) then
+      !$omp parallel do simd schedule(static) default(none) shared(self, u) private(i)
       do i = self%first_point, self%last_point
-        self%pull(i, 3) = self%share(i) * c(i)
-        self%pull(i, 1) = self%pull(i, 3) * u(i, 1)
-        self%pull(i, 2) = self%pull(i, 3) * u(i, 2)
+        self%pull(i, 1) = self%share(i) * self%control(i) * u(i, 1)
+        self%pull(i, 2) = self%share(i) * self%control(i) * u(i, 2)
       end do
       !$omp end parallel do simd
     end if
@@ -188,17 +190,16 @@ contains
   end subroutine divergence
 
   !> f <- f + Z[u] for all points.
-  subroutine add_control(self, c, u, f)
+  subroutine add_control(self, u, f)
     class(operators_t), intent(inout) :: self
-    real(wp), intent(in),    contiguous :: c(:)      !! (n) [N/m^6]
     real(wp), intent(in),    contiguous :: u(:, :)   !! (n,2) [m]
     real(wp), intent(inout), contiguous :: f(:, :)   !! (n,2) [N/m^3]
     integer :: lo
 
-    call self%weigh_displacement(u, c)
-    !$omp parallel do schedule(static) default(none) shared(self, c, u, f) private(lo)
+    call self%weigh_displacement(u)
+    !$omp parallel do schedule(static) default(none) shared(self, u, f) private(lo)
     do lo = self%first_point, self%last_point, n_block
-      call self%control_block(lo, min(lo + n_block - 1, self%last_point), c, u, f)
+      call self%control_block(lo, min(lo + n_block - 1, self%last_point), u, f)
     end do
     !$omp end parallel do
   end subroutine add_control

@@ -156,7 +156,7 @@ contains
 
   !> Observe the state; what is seen stays in the record.
   subroutine observe_state(model, state, ledger, record)
-    type(model_t),  intent(in)    :: model
+    type(model_t),  intent(inout) :: model      !! work space of its operators
     type(state_t),  intent(in)    :: state
     type(ledger_t), intent(in)    :: ledger
     type(record_t), intent(inout) :: record

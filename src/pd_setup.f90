@@ -209,13 +209,23 @@ contains
       solid%material%residual_strength = max(0.0_wp, m%residual_strength)
       allocate (solid%yield_stress(model%body%n))
       call set_up_yield_stress(input, model%body%position, solid%yield_stress)
-      if (input%stabilisation%method == 'silling') then
-        allocate (solid%control(model%body%n), source=control_stiffness( &
-          input%stabilisation%factor, m%youngs_modulus, model%delta, model%operators%weight_sum))
-        where (model%body%boundary < 0) solid%control = 0.0_wp
-      end if
+      if (input%stabilisation%method == 'silling') call set_up_control( &
+        input%stabilisation%factor, m%youngs_modulus, model)
     end associate
   end subroutine set_up_solid
+
+  !> Control of zero-energy modes after Silling.
+  subroutine set_up_control(factor, youngs_modulus, model)
+    real(wp),      intent(in)    :: factor           !! g
+    real(wp),      intent(in)    :: youngs_modulus   !! E [Pa]
+    type(model_t), intent(inout) :: model
+    real(wp), allocatable :: c(:)
+
+    allocate (c(model%body%n), source=control_stiffness(factor, youngs_modulus, model%delta, &
+      model%operators%weight_sum))
+    where (model%body%boundary < 0) c = 0.0_wp
+    call model%operators%set_control(c)
+  end subroutine set_up_control
 
   !> sigma_y0 of every point: the same everywhere or a random field, reduced in the weak patch.
   subroutine set_up_yield_stress(input, position, yield_stress)

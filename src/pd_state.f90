@@ -28,7 +28,7 @@ module pd_state
     real(wp), allocatable :: damping(:, :)    !! work of the damping, see `pd_verlet` (4,blocks)
     real(wp), allocatable :: dissipated(:)    !! work of S on dE^p (blocks) [J/m]
     integer,  allocatable :: failed(:)        !! first point with det F <= 0, 0: none (blocks)
-    real(wp), allocatable :: times(:, :)      !! clock before, between, behind kernels (3,blocks) [s]
+    real(wp), allocatable :: times(:, :)      !! clock at the ends of kernels (3,blocks) [s]
   contains
     procedure :: fit
   end type block_work_t

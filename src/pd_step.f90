@@ -68,7 +68,7 @@ contains
       call force_state(model%operators, model%solid, volume, state, work%a, blocks, timing, &
         failed_point)
       work%dissipated = sum(blocks%dissipated)
-      call internal_force(model%operators, model%solid, u, work%a, f, blocks, timing)
+      call internal_force(model%operators, u, work%a, f, blocks, timing)
       call apply_loads(model%pressures, model%boundaries, volume, t_next, f)
       call boundary_forces(x, volume, t_next, f, model%boundaries)
       work%outer_work = motion_work(model%boundaries, t, t_next) + loads_work

@@ -11,8 +11,8 @@ module pd_timing
   public :: timing_t, kernel_names, now
 
   !> Names of the kernels in the order of `timing_t%seconds`.
-  character(10), parameter :: kernel_names(6) = [character(10) :: 'motion', 'gradient', 'stress', &
-    'divergence', 'control', 'boundaries']
+  character(10), parameter :: kernel_names(7) = [character(10) :: 'motion', 'gradient', 'stress', &
+    'divergence', 'control', 'boundaries', 'history']
   integer, parameter :: timed_step = 20   !! every so many steps the blocks are timed
 
   !> Wall clock time spent in each kernel [s].

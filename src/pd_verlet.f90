@@ -93,7 +93,7 @@ contains
   subroutine kick_twice_and_drift(motion, frame, position, volume, free, f, v, u, blocks, &
     second_work, first_work)
     type(motion_t), intent(in)    :: motion
-    type(frame_t),  intent(in)    :: frame            !! at the end of the one, where the next begins
+    type(frame_t),  intent(in)    :: frame            !! where one ends and the next begins
     real(wp),       intent(in), contiguous :: position(:, :)   !! X (n,2) [m]
     real(wp),       intent(in), contiguous :: volume(:)        !! V (n) [m^2]
     real(wp),       intent(in), contiguous :: free(:, :)       !! 1: free, 0: prescribed (n,2)

@@ -228,8 +228,11 @@ contains
         call fail('the energy runs away')
       end if
     end if
-
     if (due%row) call record_row(model, state, step, record, errors)
+    if (progress_due(record%progress, step, schedule%steps)) &
+      call record_progress(model, state, schedule, step, record, errors)
+    call timing%lap(7)
+
     if (due%frame) then
       do k = 1, size(schedule%frame_steps)
         if (schedule%frame_steps(k) == step) call record_frame(model, state, step, record, errors)
@@ -239,8 +242,6 @@ contains
       call save_checkpoint(model, state, ledger, step, record, errors)
       call system_clock(last_checkpoint)
     end if
-    if (progress_due(record%progress, step, schedule%steps)) &
-      call record_progress(model, state, schedule, step, record, errors)
     call stop_if_any(errors, exit_file)
   end subroutine write_what_is_due
 
@@ -278,7 +279,8 @@ contains
     call exit_program(status)
   end subroutine interrupt
 
-  !> Last lines of the log: seconds of the time loop and of its kernels; the rest is output.
+  !> Last lines of the log: seconds of the time loop and of its kernels; the rest is frames and
+  !> checkpoints.
   subroutine tell_where_time_went()
     integer(int64) :: now, rate
     character(256) :: line
@@ -290,8 +292,8 @@ contains
     write (line, '(a,f10.3,a,i0)') 'time loop ', whole, ' s, steps ', &
       schedule%steps - checkpoint%step
     call record_line(record, trim(line), errors)
-    write (line, '(a,7(2x,a,f9.3))') 'kernels [s] ', &
-      (trim(kernel_names(k)), timing%seconds(k), k=1, size(kernel_names)), 'output', &
+    write (line, '(a,8(2x,a,f9.3))') 'kernels [s] ', &
+      (trim(kernel_names(k)), timing%seconds(k), k=1, size(kernel_names)), 'frames', &
       max(0.0_wp, whole - sum(timing%seconds))
     call record_line(record, trim(line), errors)
   end subroutine tell_where_time_went

@@ -164,9 +164,8 @@ contains
     call inverse_shape_tensor(operators, body%position, body%volume, solid%k_inverse, errors)
     if (errors%count() > 0) error stop 'samples: a body that cannot be connected'
     if (.not. present(g)) return
-    if (allocated(solid%control)) deallocate (solid%control)
-    if (g > 0.0_wp) allocate (solid%control(body%n), &
-      source=control_stiffness(g, 50.0e6_wp, delta, operators%weight_sum))
+    if (g > 0.0_wp) &
+      call operators%set_control(control_stiffness(g, 50.0e6_wp, delta, operators%weight_sum))
   end subroutine connect
 
   !> u = (F - I) X with F as xx xy yx yy.
@@ -201,7 +200,7 @@ contains
 
     allocate (a(size(volume), 4))
     call force_state(operators, solid, volume, state, a, blocks, timing, first)
-    call force_of(operators, solid, state%displacement, a, state%force, blocks, timing)
+    call force_of(operators, state%displacement, a, state%force, blocks, timing)
     if (present(dissipated)) dissipated = sum(blocks%dissipated)
     if (present(failed)) failed = first
   end subroutine internal_force
