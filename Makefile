@@ -3,7 +3,7 @@
 # The layers: a module may use only modules that stand before it in this list, from which
 # `make lint` checks all of src/.
 modules := \
-  pd_kinds pd_system pd_errors pd_text pd_files pd_input_types pd_state \
+  pd_kinds pd_memory pd_system pd_errors pd_text pd_files pd_input_types pd_state \
   pd_cursor pd_namelist pd_keys pd_input_reference pd_input_values pd_used_values \
   pd_platens pd_input_checks pd_motion_checks pd_load_checks pd_input \
   pd_geometry pd_cloud pd_cells pd_families pd_operators pd_bond_list pd_columns pd_lattice \
@@ -177,6 +177,10 @@ ifeq ($(hdf5_link),)
   $(error no HDF5 library for Fortran: run tools/setup.sh, which installs or names what is missing)
 endif
 
+# Arrays at the start of a cache line (src/pd_memory.f90), where the linker can do it.
+aligned := $(shell mkdir -p $(build); echo end | $(FC) -x f95 - -Wl,--wrap=malloc \
+  -o $(build)/try_link 2>/dev/null && echo -Wl,--wrap=malloc)
+
 sources := $(wildcard src/*.f90)
 objects := $(patsubst src/%.f90,$(build)/%.o,$(sources)) $(build)/pd_version.o
 compile  = $(FC) $(flags) $(warnings) $(hdf5_compile) -J$(build)
@@ -184,14 +188,14 @@ say      = $(if $(V),,@echo '  $(1)';)
 
 # These files change only when their contents do: what everything depends on, and the version.
 update := $(shell mkdir -p $(build)/unit bin; \
-  echo '$(compile) $(hdf5_link)' | sh tools/update_file.sh $(build)/flags; \
+  echo '$(compile) $(hdf5_link) $(aligned)' | sh tools/update_file.sh $(build)/flags; \
   sh tools/version.sh '$(FC)' '$(flags)' | sh tools/update_file.sh $(build)/pd_version.f90)
 
 program: $(if $(wildcard src/perigeo.f90),$(program),objects)
 objects: $(objects)
 
 $(program): $(objects)
-	$(call say,link     $@)$(FC) $(flags) -o $@ $(objects) $(hdf5_link)
+	$(call say,link     $@)$(FC) $(flags) -o $@ $(objects) $(hdf5_link) $(aligned)
 
 $(build)/%.o: src/%.f90 $(build)/flags
 	$(call say,compile  $<)$(compile) -c $< -o $@

@@ -4,7 +4,7 @@
 !> Source: doc/theory.md, sections 1 and 7.
 module pd_geometry
   use pd_errors, only: error_list_t
-  use pd_kinds, only: wp
+  use pd_kinds, only: n_line, wp
   implicit none
   private
 
@@ -217,15 +217,16 @@ contains
     real(wp),        intent(in)    :: origin(2)
     type(lattice_t), intent(in)    :: lattice
     type(body_t),    intent(inout) :: body
-    integer  :: ix, iy, i, k, quarters, low(2), high(2)
+    integer  :: ix, iy, i, k, margin, quarters, low(2), high(2)
     real(wp) :: offset
 
     call occupied_box(places, low, high)
     body%n = count(places%owner /= void)
     allocate (body%points(body%n))
     if (lattice%with_voids) then
-      body%stride = high(1) - low(1) + 1 + lattice%rows
-      body%n = body%stride * (high(2) - low(2) + 1 + 2 * lattice%rows) + 2 * lattice%rows
+      margin = whole_lines(lattice%rows)
+      body%stride = whole_lines(high(1) - low(1) + 1 + lattice%rows)
+      body%n = body%stride * (high(2) - low(2) + 1 + 2 * lattice%rows) + 2 * margin
     end if
     allocate (body%position(body%n, 2), body%volume(body%n), source=0.0_wp)
     allocate (body%boundary(body%n), source=void)
@@ -238,7 +239,7 @@ contains
         if (places%owner(ix, iy) == void) cycle
         k = k + 1
         i = k
-        if (lattice%with_voids) i = lattice%rows + 1 + ix - low(1) &
+        if (lattice%with_voids) i = margin + 1 + ix - low(1) &
           + body%stride * (iy - low(2) + lattice%rows)
         body%points(k) = i
         places%number(ix, iy) = i
@@ -251,6 +252,13 @@ contains
       end do
     end do
   end subroutine number_points
+
+  !> Places in as many whole lines of the cache as hold a number of them.
+  pure integer function whole_lines(count) result(places)
+    integer, intent(in) :: count
+
+    places = n_line * ((count + n_line - 1) / n_line)
+  end function whole_lines
 
   !> Index of a side in `body_t%sides`, 0 where there is none of that name.
   pure integer function side_number(side) result(k)

@@ -4,7 +4,7 @@ module pd_kinds
   implicit none
   private
 
-  public :: wp, i8, pi, unset, is_set, n_block, block_sum, block_dot
+  public :: wp, i8, pi, unset, is_set, n_block, n_line, block_sum, block_dot
 
   integer, parameter :: wp = real64
   integer, parameter :: i8 = int64
@@ -17,6 +17,10 @@ module pd_kinds
   !> Points are worked on in blocks of this many, whatever the number of threads: every sum is
   !> taken over a block and then over the blocks in order, so the bits do not depend on threads.
   integer, parameter :: n_block = 256
+
+  !> Numbers in a line of the cache, 64 bytes. Arrays begin at one (`pd_memory`), and on a lattice
+  !> rows and blocks do, so that vector instructions seldom meet two lines.
+  integer, parameter :: n_line = 8
 
 contains
 

@@ -15,7 +15,7 @@
 module pd_lattice
   use pd_columns, only: add_sums, columns_t, new_columns
   use pd_families, only: horizon_t, influence, within_horizon
-  use pd_kinds, only: i8, n_block, wp
+  use pd_kinds, only: i8, n_block, n_line, wp
   use pd_operators, only: operators_t
   implicit none
   private
@@ -89,7 +89,7 @@ contains
     operators%weighs = any(abs(operators%share) > 0.0_wp .and. &
       abs(operators%share - 1.0_wp) > 1.0e-12_wp)
     if (.not. operators%weighs) operators%share = anint(operators%share)
-    operators%first_point = findloc(volume > 0.0_wp, .true., dim=1)
+    operators%first_point = line_start(findloc(volume > 0.0_wp, .true., dim=1))
     operators%last_point = findloc(volume > 0.0_wp, .true., dim=1, back=.true.)
     call weigh(operators)
     if (operators%weighs) then
@@ -100,6 +100,13 @@ contains
       end do
     end if
   end subroutine new_lattice_operators
+
+  !> First place in the line of the cache that holds a place: blocks begin there.
+  pure integer function line_start(place)
+    integer, intent(in) :: place
+
+    line_start = n_line * ((place - 1) / n_line) + 1
+  end function line_start
 
   !> The columns of the family of an inner point.
   pure type(columns_t) function columns_of(horizon, spacing, stride, most) result(columns)
