@@ -177,11 +177,12 @@ ifeq ($(hdf5_link),)
   $(error no HDF5 library for Fortran: run tools/setup.sh, which installs or names what is missing)
 endif
 
-# Arrays at the start of a cache line (src/pd_memory.f90), where the linker can do it.
-aligned := $(shell mkdir -p $(build); echo end | $(FC) -x f95 - -Wl,--wrap=malloc \
-  -o $(build)/try_link 2>/dev/null && echo -Wl,--wrap=malloc)
+# Arrays at the start of a cache line (src/pd_memory.f90), where linker and C library can do it.
+aligned := $(shell mkdir -p $(build)/try; echo end | $(FC) -J$(build)/try src/pd_memory.f90 \
+  -x f95 - -Wl,--wrap=malloc -o $(build)/try/link 2>/dev/null && echo -Wl,--wrap=malloc)
+left_out := $(if $(aligned),,pd_memory)
 
-sources := $(wildcard src/*.f90)
+sources := $(filter-out $(left_out:%=src/%.f90),$(wildcard src/*.f90))
 objects := $(patsubst src/%.f90,$(build)/%.o,$(sources)) $(build)/pd_version.o
 compile  = $(FC) $(flags) $(warnings) $(hdf5_compile) -J$(build)
 say      = $(if $(V),,@echo '  $(1)';)
@@ -217,7 +218,8 @@ post:
 # One program for each suite tests/unit/test_*.pf, with pFUnit or with the small runner in
 # tests/support. Modules that suites share are tests/unit/*.f90.
 python  := $(firstword $(wildcard $(venv)/bin/python) python3)
-suites  := $(patsubst tests/unit/%.pf,%,$(wildcard tests/unit/test_*.pf))
+suites  := $(filter-out $(left_out:%=test_%), \
+  $(patsubst tests/unit/%.pf,%,$(wildcard tests/unit/test_*.pf)))
 support := tests/support
 
 ifneq ($(PFUNIT_DIR),)
@@ -247,6 +249,9 @@ unit_compile = $(FC) $(unit_std) $(strip $(unit_flags)) -fopenmp -ffree-line-len
   -I$(build) $(hdf5_compile) $(unit_with)
 
 units: $(suites:%=$(unit)/%)
+
+suites:
+	@echo $(suites)
 
 $(unit)/funit.o: $(support)/funit.f90 $(unit)/flags
 	$(call say,compile  $<)$(unit_compile) -J$(unit) -c $< -o $@

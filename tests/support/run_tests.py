@@ -54,19 +54,24 @@ def say(text=""):
     print(text, flush=True)
 
 
-def make(command, build, *goals):
-    """Call make with the settings of this run; return whether it succeeded."""
+def call_make(command, build, *goals, **options):
+    """Call make with the settings of this run."""
     # The jobserver of the make above is out of reach from here.
     flags = os.environ.get("MAKEFLAGS", "").split()
     kept = [flag for flag in flags if not flag.startswith(("-j", "--jobserver"))]
     words = [*command.split(), "--no-print-directory", f"-j{os.cpu_count() or 1}"]
-    done = subprocess.run(
+    return subprocess.run(
         [*words, f"BUILD={build}", *goals],
         cwd=ROOT,
         env=dict(os.environ, MAKEFLAGS=" ".join(kept)),
         check=False,
+        **options,
     )
-    return done.returncode == 0
+
+
+def make(command, build, *goals):
+    """Call make; return whether it succeeded."""
+    return call_make(command, build, *goals).returncode == 0
 
 
 # ------------------------------------------------------------------------------- unit tests
@@ -194,20 +199,21 @@ def build_units(command, build):
     if make(command, build, "-k", "units"):
         return set()
     # The program of an earlier build may still be there, so make is asked for each suite.
-    names = [suite.stem for suite in unit_suites()]
+    names = [suite.stem for suite in unit_suites(command, build)]
     return {name for name in names if not make(command, build, "-q", unit_folder(build) / name)}
 
 
-def unit_suites():
-    """Return the suites in the order of their names."""
-    return sorted((ROOT / "tests" / "unit").glob("test_*.pf"))
+def unit_suites(command, build):
+    """Return the suites in the order of their names; make knows what this machine cannot have."""
+    found = call_make(command, build, "-s", "suites", stdout=subprocess.PIPE, text=True).stdout
+    return [ROOT / "tests" / "unit" / f"{name}.pf" for name in sorted(found.split())]
 
 
-def run_units(build, with_pfunit, unbuilt):
+def run_units(command, build, with_pfunit, unbuilt):
     """Run every suite in tests/unit."""
     count = Count()
     folder = ROOT / unit_folder(build)
-    suites = unit_suites()
+    suites = unit_suites(command, build)
     if not suites:
         say("tests/unit: no suites")
         return Count(failed=1)
@@ -279,7 +285,7 @@ def main():
     unbuilt = build_units(options.make, options.build)
 
     say(f"\nUnit tests ({'pFUnit' if with_pfunit else 'the small runner'})")
-    parts["tests/unit"] = run_units(options.build, with_pfunit, unbuilt)
+    parts["tests/unit"] = run_units(options.make, options.build, with_pfunit, unbuilt)
     for path in PYTEST_SUITES:
         say(f"\nTests of {path}")
         report = ROOT / "build" / options.build / f"{path.replace('/', '-')}.xml"
