@@ -210,6 +210,18 @@ def loop_seconds(found: dict[str, float]) -> float:
     return found["loop"] - found["frames"]
 
 
+def curve_difference(one: str, other: str, last_strain: float) -> float:
+    """Largest difference of two stress-strain curves up to a strain, in per cent of the peak."""
+    curves = []
+    for name in (one, other):
+        rows = np.genfromtxt(RESULTS / name / f"{name}_history.csv", delimiter=",", names=True)
+        curves.append((rows["strain"], rows["bottom_force_y"]))
+    (strain, force), (strains, forces) = curves
+    kept = strain <= last_strain
+    difference = np.abs(force[kept] - np.interp(strain[kept], strains, forces))
+    return float(100.0 * difference.max() / np.abs(force).max())
+
+
 def step_ns(found: dict[str, float]) -> float:
     """Nanoseconds of a whole step for a point, times the threads: per core."""
     return 1e9 * loop_seconds(found) * found["threads"] / found["steps"] / found["points"]
@@ -352,6 +364,11 @@ def measure(quick: bool) -> tuple[dict[str, object], list[tuple[str, str]]]:
         [f"{cores} threads over 1, (a)", "at least 1.6", threads_gain(a, a_all)],
         [f"{cores} threads over 1, (c)", "", threads_gain(c, c_all)],
         ["list with courant 0.5 over lattice, whole (a)", "at least 5", f"{whole:.1f}"],
+        [
+            "difference of these curves up to 0.9 % strain, % of the peak",
+            "at most 0.5",
+            f"{curve_difference('a_lattice', 'a_list_courant', 0.009):.3f}",
+        ],
         ["ns/point-step, (a) with m = 3", "at most 40", f"{step_ns(a_m3):.1f}"],
         ["ns/point-step, (a)", "at most 60", f"{step_ns(a):.1f}"],
         ["10^6 bond updates/s of the operators, (a)", "at least 1200", f"{bond_rate(a):.0f}"],
