@@ -188,7 +188,8 @@ contains
         state%deformation_gradient, state%displacement, mean, z)
     end do
     !$omp end parallel do
-    energy = max(0.0_wp, sum(energy_of))
+    energy = sum(energy_of)
+    if (energy < 0.0_wp) energy = 0.0_wp   ! not max: it would hide what is not a number
   end subroutine control_energy
 
   !> The same for points lo to hi.
