@@ -1,18 +1,8 @@
 # perigeo: `make help` lists the targets. Needs GNU make 3.81 or later and a POSIX shell.
 #
-# The layers: a module may use only modules that stand before it in this list, from which
-# `make lint` checks all of src/.
-modules := \
-  pd_kinds pd_memory pd_system pd_errors pd_text pd_files pd_input_types pd_state \
-  pd_cursor pd_namelist pd_keys pd_input_reference pd_input_values pd_used_values \
-  pd_platens pd_input_checks pd_motion_checks pd_load_checks pd_input \
-  pd_geometry pd_cloud pd_cells pd_families pd_operators pd_bond_list pd_columns pd_lattice \
-  pd_kinematics pd_strain pd_j2 pd_timing pd_force pd_random pd_random_field \
-  pd_boundary pd_pressure pd_loads pd_verlet pd_stability pd_observe pd_schedule pd_setup pd_step \
-  pd_summary \
-  pd_version \
-  pd_hdf5_file pd_hdf5 pd_xdmf pd_frames pd_result pd_history pd_checkpoint pd_progress \
-  pd_record pd_command_line perigeo
+# The layers are the folders of src/: a module may use modules of its own folder and of folders
+# before it in this list. `make lint` checks it.
+layers := base system input body operators material loads motion setup output app
 
 # ---------------------------------------------------------------------------------- settings
 BUILD  = opt
@@ -118,7 +108,7 @@ debug:             ## build bin/perigeo-debug, which checks bounds and traps inv
 	@$(submake) BUILD=debug program
 
 layers:
-	@echo $(modules)
+	@echo $(layers)
 
 lint:              ## compiler warnings as errors, Fortran and Python linters, layer check
 	@sh tools/setup.sh lint
@@ -177,13 +167,14 @@ ifeq ($(hdf5_link),)
   $(error no HDF5 library for Fortran: run tools/setup.sh, which installs or names what is missing)
 endif
 
-# Arrays at the start of a cache line (src/pd_memory.f90), where linker and C library can do it.
-aligned := $(shell mkdir -p $(build)/try; echo end | $(FC) -J$(build)/try src/pd_memory.f90 \
+# Arrays at the start of a cache line (src/system/pd_memory.f90), where linker and C library can do it.
+aligned := $(shell mkdir -p $(build)/try; echo end | $(FC) -J$(build)/try src/system/pd_memory.f90 \
   -x f95 - -Wl,--wrap=malloc -o $(build)/try/link 2>/dev/null && echo -Wl,--wrap=malloc)
 left_out := $(if $(aligned),,pd_memory)
 
-sources := $(filter-out $(left_out:%=src/%.f90),$(wildcard src/*.f90))
-objects := $(patsubst src/%.f90,$(build)/%.o,$(sources)) $(build)/pd_version.o
+sources := $(filter-out $(left_out:%=src/system/%.f90),$(wildcard $(layers:%=src/%/*.f90)))
+objects := $(patsubst %.f90,$(build)/%.o,$(notdir $(sources))) $(build)/pd_version.o
+vpath %.f90 $(layers:%=src/%) $(build)
 compile  = $(FC) $(flags) $(warnings) $(hdf5_compile) -J$(build)
 say      = $(if $(V),,@echo '  $(1)';)
 
@@ -192,16 +183,13 @@ update := $(shell mkdir -p $(build)/unit bin; \
   echo '$(compile) $(hdf5_link) $(aligned)' | sh tools/update_file.sh $(build)/flags; \
   sh tools/version.sh '$(FC)' '$(flags)' | sh tools/update_file.sh $(build)/pd_version.f90)
 
-program: $(if $(wildcard src/perigeo.f90),$(program),objects)
+program: $(if $(wildcard src/app/perigeo.f90),$(program),objects)
 objects: $(objects)
 
 $(program): $(objects)
 	$(call say,link     $@)$(FC) $(flags) -o $@ $(objects) $(hdf5_link) $(aligned)
 
-$(build)/%.o: src/%.f90 $(build)/flags
-	$(call say,compile  $<)$(compile) -c $< -o $@
-
-$(build)/pd_version.o: $(build)/pd_version.f90 $(build)/flags
+$(build)/%.o: %.f90 $(build)/flags
 	$(call say,compile  $<)$(compile) -c $< -o $@
 
 # What this machine can do: memory bandwidth and arithmetic, for `make bench`.
@@ -215,11 +203,12 @@ post:
 	  echo 'perigeo-post is not installed; the program does not need it.'
 
 # ---------------------------------------------------------------------------------- unit tests
-# One program for each suite tests/unit/test_*.pf, with pFUnit or with the small runner in
+# One program for each suite tests/unit/LAYER/test_*.pf, with pFUnit or with the small runner in
 # tests/support. Modules that suites share are tests/unit/*.f90.
 python  := $(firstword $(wildcard $(venv)/bin/python) python3)
 suites  := $(filter-out $(left_out:%=test_%), \
-  $(patsubst tests/unit/%.pf,%,$(wildcard tests/unit/test_*.pf)))
+  $(patsubst %.pf,%,$(notdir $(wildcard $(layers:%=tests/unit/%/test_*.pf)))))
+vpath %.pf $(layers:%=tests/unit/%)
 support := tests/support
 
 ifneq ($(PFUNIT_DIR),)
@@ -259,7 +248,7 @@ $(unit)/funit.o: $(support)/funit.f90 $(unit)/flags
 $(unit)/%.o: tests/unit/%.f90 $(unit)/flags
 	$(call say,compile  $<)$(unit_compile) -J$(unit) -c $< -o $@
 
-$(unit)/%.$(unit_form): tests/unit/%.pf $(support)/pf_to_f90.py
+$(unit)/%.$(unit_form): %.pf $(support)/pf_to_f90.py
 	@$(call translate,$<,$@)
 
 # Modules of a suite go to a folder of its own: with pFUnit every driver has the same names. What
@@ -267,14 +256,14 @@ $(unit)/%.$(unit_form): tests/unit/%.pf $(support)/pf_to_f90.py
 $(suites:%=$(unit)/%): $(unit)/%: $(unit)/%.$(unit_form) $(runner)
 	@mkdir -p $@.modules
 	@echo 'ADD_TEST_SUITE($*_suite)' > $@.modules/$*.inc
-	$(call say,compile  tests/unit/$*.pf)$(unit_compile) -I$(unit) -J$@.modules -o $@ $< \
+	$(call say,compile  $*.pf)$(unit_compile) -I$(unit) -J$@.modules -o $@ $< \
 	  $(call driver,$*) $(filter %.o,$^) $(unit_libs) $(hdf5_link)
 
 # Who uses whom, written anew when it has changed.
 update := $(shell mkdir -p $(unit); \
   echo '$(unit_compile) $(hdf5_link)' | sh tools/update_file.sh $(unit)/flags; \
   awk -f tools/depends.awk -v build=$(build) -v unit=$(unit) $(sources) \
-    $(wildcard tests/unit/*.f90 tests/unit/test_*.pf) | \
+    $(wildcard tests/unit/*.f90 $(layers:%=tests/unit/%/test_*.pf)) | \
     sh tools/update_file.sh $(unit)/depends.mk)
 include $(unit)/depends.mk
 

@@ -1,6 +1,6 @@
 # Print make rules that say which object files must be there before a source file is compiled:
 #
-#   awk -f tools/depends.awk -v build=build/opt -v unit=build/opt/unit src/*.f90 tests/unit/*
+#   awk -f tools/depends.awk -v build=build/opt -v unit=build/opt/unit src/*/*.f90 tests/unit/*/*
 #
 # A suite (.pf) becomes a program: it depends on all modules that it uses, and on all that those
 # use. Modules of others (iso_c_binding, hdf5, omp_lib) are passed over: only files named on the

@@ -1,6 +1,6 @@
 """Namelist texts of the program: taken apart, changed, put together again.
 
-The scanner follows that of the program (src/pd_namelist.f90). Comments are left out, values stay as
+The scanner follows that of the program (src/input/pd_namelist.f90). Comments are left out, values stay as
 they are written. What groups and keys mean is the program's business.
 """
 

@@ -70,17 +70,17 @@ def test_options_of_the_program_that_are_named_exist():
 def test_sections_of_the_theory_that_the_sources_name_exist():
     theory = (ROOT / "doc" / "theory.md").read_text()
     sections = set(re.findall(r"^## (\d+)\. ", theory, re.M))
-    for path in sorted((ROOT / "src").glob("*.f90")):
+    for path in sorted((ROOT / "src").glob("*/*.f90")):
         for reference in re.findall(r"theory\.md, sections? ([\d, toand]+)", path.read_text()):
             assert set(re.findall(r"\d+", reference)) <= sections, path.name
 
 
 def test_the_results_page_lists_every_column_and_field():
     page = (ROOT / "doc" / "results.md").read_text()
-    history = (ROOT / "src" / "pd_history.f90").read_text()
+    history = (ROOT / "src" / "output" / "pd_history.f90").read_text()
     header = re.search(r"function header\b.*?end function", history, re.S).group()
     words = re.findall(r"\w+", " ".join(re.findall(r"'([^']+)'", header)))
-    frames = (ROOT / "src" / "pd_frames.f90").read_text()
+    frames = (ROOT / "src" / "output" / "pd_frames.f90").read_text()
     fields = re.findall(r"field_t\('(\w+)'", frames)
     assert len(words) > 12
     assert len(fields) > 5

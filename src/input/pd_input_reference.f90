@@ -80,8 +80,8 @@ contains
 
     call put(unit, '# The input file')
     call put(unit, '')
-    call put(unit, 'Written by `perigeo --input-reference`; change `src/pd_keys.f90` and')
-    call put(unit, '`src/pd_input_reference.f90`, not this page.')
+    call put(unit, 'Written by `perigeo --input-reference`; change `src/input/pd_keys.f90` and')
+    call put(unit, '`src/input/pd_input_reference.f90`, not this page.')
     call put(unit, '')
     call put(unit, 'A run is described by one text file of Fortran namelist groups. A group')
     call put(unit, 'starts with `&` and its name and ends with `/`; between them stand keys')
