@@ -61,7 +61,7 @@ def test_post_processing_commands_that_are_named_exist():
 
 
 def test_options_of_the_program_that_are_named_exist():
-    source = (ROOT / "src" / "pd_command_line.f90").read_text()
+    source = (ROOT / "src" / "app" / "pd_command_line.f90").read_text()
     for document, words in named(r"(?:^|/)perigeo((?: +[-\w./]+)*)"):
         for option in re.findall(r"--[\w-]+", words):
             assert f"'{option}'" in source, document
@@ -90,7 +90,7 @@ def test_the_results_page_lists_every_column_and_field():
 
 def test_the_results_page_lists_every_attribute_of_the_file():
     page = (ROOT / "doc" / "results.md").read_text()
-    source = (ROOT / "src" / "pd_result.f90").read_text()
+    source = (ROOT / "src" / "output" / "pd_result.f90").read_text()
     attributes = re.findall(r"write_attribute\(file, '/', '(\w+)'", source)
     assert len(attributes) > 10
     assert not [name for name in attributes if f"`{name}`" not in page]
