@@ -6,7 +6,7 @@ module pd_summary
   use pd_kinds, only: is_set, wp
   use pd_random_field, only: spread_of, spread_t
   use pd_schedule, only: schedule_t
-  use pd_setup, only: model_t
+  use pd_model, only: model_t
   use pd_stability, only: wave_speed
   implicit none
   private

@@ -20,8 +20,8 @@ program perigeo
     record_frame, record_line, record_progress, record_row, record_t, results_in_the_way, &
     same_points, save_checkpoint
   use pd_schedule, only: row_due, schedule_t
-  use pd_setup, only: find_highest_frequency, model_t, set_up_body, set_up_model, &
-    set_up_schedule, start
+  use pd_model, only: find_highest_frequency, model_t, start
+  use pd_setup, only: set_up_body, set_up_model, set_up_schedule
   use pd_state, only: state_t
   use pd_step, only: step_work_t, take_step
   use pd_summary, only: estimated_seconds, summarise, summary_t

@@ -19,7 +19,7 @@ module pd_record
   use pd_result, only: create_result, finish_result, frame_source_t, provenance_t, &
     result_exists, result_t, resume_result, run_description_t, write_failed_frame, write_frame
   use pd_schedule, only: schedule_t
-  use pd_setup, only: model_t
+  use pd_model, only: model_t
   use pd_state, only: state_t
   use pd_version, only: build_flags, code_version, git_hash
   implicit none

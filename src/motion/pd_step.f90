@@ -8,7 +8,7 @@ module pd_step
   use pd_kinds, only: wp
   use pd_loads, only: apply_loads, load_work
   use pd_observe, only: ledger_t
-  use pd_setup, only: damping_frame, model_t
+  use pd_model, only: damping_frame, model_t
   use pd_state, only: block_work_t, state_t
   use pd_timing, only: timing_t
   use pd_verlet, only: kick, kick_and_drift, kick_twice_and_drift
