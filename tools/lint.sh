@@ -29,7 +29,7 @@ compiler_warnings() {
 
 layers() {
   sh tools/check_layers.sh --self-test &&
-    sh tools/check_layers.sh src $($make -s --no-print-directory layers)
+    sh tools/check_layers.sh src tests/unit $($make -s --no-print-directory layers)
 }
 
 # Text files of our own, one a line.
