@@ -32,7 +32,11 @@ layers() {
     sh tools/check_layers.sh src tests/unit $($make -s --no-print-directory layers)
 }
 
-# Text files of our own, one a line.
+limits() {
+  $bin/python tools/check_limits.py --self-test && $bin/python tools/check_limits.py
+}
+
+# Text files of our own, one on each line.
 text_files() {
   find . \( -name .git -o -name .venv -o -name build -o -name bin -o -name results -o \
     -name '*.egg-info' -o -name '.*_cache' -o -name shared \) -prune -o -type f \
@@ -71,6 +75,7 @@ echo "Lint"
 stage "compiler warnings" compiler_warnings
 stage "fortitude" $bin/fortitude check --no-show-fixes src tests
 stage "layers" layers
+stage "limits" limits
 stage "layout of the text" layout
 stage "shell scripts" shell_scripts
 stage "ruff" $bin/ruff check .
