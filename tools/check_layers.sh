@@ -32,11 +32,11 @@ check() {
     return 1
   fi
   suites=$(cd "$unit" && find . -type f | sed 's|^\./||' | sort)
-  # The names of files hold no blanks: they are names of modules.
+  # The names of files are names of modules, without blanks; awk takes no text of several lines.
   # shellcheck disable=SC2086
-  awk -v src="$src" -v unit="$unit" -v list="$*" -v folders="$(echo $folders)" \
-    -v suites="$(echo $suites)" -v generated="$generated" -v may_know="$may_know_voids" \
-    -v upward_today="$upward_today" -v voids_today="$(echo $voids_today)" '
+  awk -v src="$src" -v unit="$unit" -v list="$*" -v folders="$(printf '%s ' $folders)" \
+    -v suites="$(printf '%s ' $suites)" -v generated="$generated" -v may_know="$may_know_voids" \
+    -v upward_today="$upward_today" -v voids_today="$(printf '%s ' $voids_today)" '
     BEGIN {
       count = split(list, names, " ")
       for (i = 1; i <= count; i++) layer[names[i]] = i
@@ -199,7 +199,7 @@ self_test() {
     name=${3:-${name%.f90}}
     printf '%s\n' "module $name" "  ${2:-implicit none}" "end module $name" > "$src/$1"
   }
-  # Sound sources: three layers, a use within a folder, downward uses, a suite and what suites share.
+  # Sound sources: three layers, uses within a folder and downwards, a suite, what suites share.
   sound() {
     rm -rf "$src" "$unit"
     mkdir -p "$src/low" "$src/operators" "$src/high" "$unit/low"
