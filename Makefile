@@ -176,10 +176,11 @@ endif
 
 # Arrays at the start of a cache line (src/system/pd_memory.f90), where linker and C library can
 # do it. What it gains is in doc/performance.md; ALIGNED=0 goes without.
+# Folders come first: what make has looked for and not found, it does not look for again.
+update := $(shell mkdir -p $(build)/try $(build)/unit bin)
 ifneq ($(ALIGNED),0)
-  aligned := $(shell mkdir -p $(build)/try; echo end | $(FC) -J$(build)/try \
-    src/system/pd_memory.f90 -x f95 - -Wl,--wrap=malloc -o $(build)/try/link 2>/dev/null && \
-    echo -Wl,--wrap=malloc)
+  aligned := $(shell echo end | $(FC) -J$(build)/try src/system/pd_memory.f90 -x f95 - \
+    -Wl,--wrap=malloc -o $(build)/try/link 2>/dev/null && echo -Wl,--wrap=malloc)
 endif
 left_out := $(if $(aligned),,pd_memory)
 
@@ -190,8 +191,8 @@ compile  = $(FC) $(flags) $(warnings) $(hdf5_compile) -J$(build)
 say      = $(if $(V),,@echo '  $(1)';)
 
 # These files change only when their contents do: what everything depends on, and the version.
-update := $(shell mkdir -p $(build)/unit bin; \
-  echo '$(compile) $(hdf5_link) $(aligned)' | sh tools/update_file.sh $(build)/flags; \
+update := $(shell echo '$(compile) $(hdf5_link) $(aligned)' | \
+  sh tools/update_file.sh $(build)/flags; \
   sh tools/version.sh '$(FC)' '$(flags)' | sh tools/update_file.sh $(build)/pd_version.f90)
 
 program: $(if $(wildcard src/app/perigeo.f90),$(program),objects)

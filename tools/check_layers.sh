@@ -283,8 +283,8 @@ self_test() {
   expect wrong 'no sources' 'an empty folder'
 
   sound
-  for line in 'x = 0   ! Voids stay zero' 'if (owner == void) cycle' 'x = model%operators%share(i)' \
-    'call operators%weigh_block(1, n, a)' 'if (operators%weighs) return'; do
+  for line in 'x = 0   ! Voids stay zero' 'if (owner == void) cycle' \
+    'x = model%operators%share(i)' 'call operators%weigh_block(1, n, a)' 'if (operators%weighs) return'; do
     write high/pd_d.f90 "$line"
     expect wrong 'high/pd_d.f90:2: voids and shares' "what only operators may know: $line"
   done
