@@ -1,4 +1,4 @@
-!> What this library was built from, where fpm has built it: the Makefile writes a module of its own.
+!> What this library was built from, where fpm has built it. The Makefile writes one of its own.
 module pd_version
   use, intrinsic :: iso_fortran_env, only: compiler_options, compiler_version
   implicit none
