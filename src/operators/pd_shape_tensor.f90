@@ -1,26 +1,25 @@
-!> Shape tensor and deformation gradient.
+!> Shape tensors: K of every family, and its inverse, which the operators keep.
 !>
 !> Source: doc/theory.md, section 2.
-module pd_kinematics
+module pd_shape_tensor
   use pd_errors, only: error_list_t
   use pd_kinds, only: wp
   use pd_operators, only: operators_t
   implicit none
   private
 
-  public :: inverse_shape_tensor, deformation_gradient_block
+  public :: invert_shape_tensors
 
 contains
 
-  !> K^-1 of every point; zero for voids (volume 0).
+  !> K^-1 of every point, kept in the operators; zero in rows without a point (volume 0).
   !>
   !> Errors: a family with too few bonds or (nearly) on one line: condition number of K, a
   !> scale-free number, over 1e6. The first few such points are named with their positions.
-  subroutine inverse_shape_tensor(operators, position, volume, k_inverse, errors)
-    class(operators_t), intent(in)    :: operators
+  subroutine invert_shape_tensors(operators, position, volume, errors)
+    class(operators_t), intent(inout) :: operators
     real(wp),           intent(in), contiguous :: position(:, :)   !! X (n,2) [m]
-    real(wp),           intent(in), contiguous :: volume(:)        !! V (n) [m^2]; voids: 0
-    real(wp),           intent(out), contiguous :: k_inverse(:, :)  !! (n,3) xx yy xy [1/m^4]
+    real(wp),           intent(in), contiguous :: volume(:)        !! V (n) [m^2]
     type(error_list_t), intent(inout) :: errors
     real(wp), parameter :: largest_condition = 1.0e6_wp
     integer,  parameter :: most_reported = 10
@@ -31,17 +30,17 @@ contains
 
     allocate (k(operators%n, 3))
     call operators%shape_tensor(k)
+    allocate (operators%k_inverse(operators%n, 3), source=0.0_wp)
     n_singular = 0
     do i = 1, operators%n
-      k_inverse(i, :) = 0.0_wp
       if (volume(i) <= 0.0_wp) cycle
       mean = 0.5_wp * (k(i, 1) + k(i, 2))
       radius = sqrt((0.5_wp * (k(i, 1) - k(i, 2)))**2 + k(i, 3)**2)
       determinant = k(i, 1) * k(i, 2) - k(i, 3)**2
       if (determinant > 0.0_wp .and. mean + radius < largest_condition * (mean - radius)) then
-        k_inverse(i, 1) = k(i, 2) / determinant
-        k_inverse(i, 2) = k(i, 1) / determinant
-        k_inverse(i, 3) = -k(i, 3) / determinant
+        operators%k_inverse(i, 1) = k(i, 2) / determinant
+        operators%k_inverse(i, 2) = k(i, 1) / determinant
+        operators%k_inverse(i, 3) = -k(i, 3) / determinant
       else
         n_singular = n_singular + 1
         if (n_singular > most_reported) cycle
@@ -55,27 +54,6 @@ contains
       write (text, '(i0,a)') n_singular - most_reported, ' more points have a singular shape tensor'
       call errors%add(trim(text))
     end if
-  end subroutine inverse_shape_tensor
+  end subroutine invert_shape_tensors
 
-  !> F = I + G[u] K^-1 of points lo to hi, in the place of G[u].
-  pure subroutine deformation_gradient_block(lo, hi, k_inverse, gradient)
-    integer,  intent(in) :: lo, hi
-    real(wp), intent(in),    contiguous :: k_inverse(:, :)  !! (n,3) xx yy xy [1/m^4]
-    real(wp), intent(inout), contiguous :: gradient(:, :)   !! (n,4) xx xy yx yy; G[u] [m^4] -> F
-    integer  :: i
-    real(wp) :: gxx, gxy, gyx, gyy
-
-    !$omp simd simdlen(8) private(gxx, gxy, gyx, gyy)
-    do i = lo, hi
-      gxx = gradient(i, 1)
-      gxy = gradient(i, 2)
-      gyx = gradient(i, 3)
-      gyy = gradient(i, 4)
-      gradient(i, 1) = 1.0_wp + gxx * k_inverse(i, 1) + gxy * k_inverse(i, 3)
-      gradient(i, 2) = gxx * k_inverse(i, 3) + gxy * k_inverse(i, 2)
-      gradient(i, 3) = gyx * k_inverse(i, 1) + gyy * k_inverse(i, 3)
-      gradient(i, 4) = 1.0_wp + gyx * k_inverse(i, 3) + gyy * k_inverse(i, 2)
-    end do
-  end subroutine deformation_gradient_block
-
-end module pd_kinematics
+end module pd_shape_tensor
