@@ -28,7 +28,7 @@ def freeze(case, results):
         found = changes(sums, old[build], numbers, reference)
         added = [f"{name}: new" for name in sorted(sums.keys() - old[build].keys())]
         changed = changed or bool(found)
-        lines += [f"{line} [{build}]" for line in found + added]
+        lines += [f"build: {build}"] * bool(found + added) + found + added
     new = {build: sums for build, sums, _ in results}
     kept = {} if changed else {build: sums for build, sums in old.items() if build not in new}
     lines += [f"dropped: {build}" for build in old if build not in kept | new]
