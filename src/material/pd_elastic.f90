@@ -49,7 +49,7 @@ contains
     type(flow_t), intent(inout) :: flow
     real(wp) :: stress(n_block, 4)
 
-    flow%any = .false.
+    flow%n = 0
     call isotropic_stress_block(self%lambda, self%shear_modulus, first, lo, hi, strain, stress)
     points%stress(lo:hi, :) = stress(lo - first + 1:hi - first + 1, :)
   end subroutine stress_block

@@ -1,8 +1,8 @@
 !> A material law: what the points of a material remember, and their stress.
 !>
 !> A law is a type that extends `law_t`, in a module of its own; set-up chooses it by one line. A
-!> law works on rows lo to hi of the fields of all points, which belong to its material. Strain,
-!> and what it tells of its flow, are arrays of a block, whose row 1 is row `first` of the fields.
+!> law works on rows lo to hi of the fields of all points, which belong to its material. Strain is an
+!> array of a block, whose row 1 is row `first` of the fields.
 !> Source: doc/theory.md, section 3.
 module pd_law
   use pd_kinds, only: n_block, wp
@@ -25,10 +25,11 @@ module pd_law
     real(wp), allocatable :: strength(:)     !! before any flow (n) [Pa]; not of a law without one
   end type law_points_t
 
-  !> What happened in a block in a step.
+  !> What flowed in some rows of a block in a step.
   type :: flow_t
-    logical  :: any = .false.              !! some row flows; else the rest says nothing
-    real(wp) :: dissipated(n_block)        !! work of the stress on the plastic strain [J/m^3]
+    integer  :: n = 0                      !! rows that flow
+    integer  :: rows(n_block)              !! (n) ascending
+    real(wp) :: dissipated(n_block)        !! work of the stress on the plastic strain (n) [J/m^3]
   end type flow_t
 
   type, abstract :: law_t
