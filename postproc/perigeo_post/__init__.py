@@ -11,8 +11,19 @@ Example::
 Everything that the command line does is a function here.
 """
 
-from .animation import animate
-from .band import (
+from .draw.animation import animate
+from .draw.contours import contour_figure
+from .draw.figures import (
+    band_figure,
+    column_figure,
+    compare_figure,
+    curve_figure,
+    energy_figure,
+    profile_figure,
+    stress_strain_figure,
+)
+from .draw.style import save_figure
+from .measure.band import (
     Band,
     BandMeasure,
     BandSystem,
@@ -23,9 +34,8 @@ from .band import (
     profile_along,
     profile_width,
 )
-from .band_search import find_bands
-from .contours import contour_figure
-from .curves import (
+from .measure.band_search import find_bands
+from .measure.curves import (
     Curve,
     Modulus,
     apparent_modulus,
@@ -36,7 +46,24 @@ from .curves import (
     peak,
     stress_strain,
 )
-from .errors import (
+from .measure.export import (
+    to_json,
+    write_bands,
+    write_curves,
+    write_points,
+    write_profiles,
+    write_rows,
+)
+from .measure.measures import (
+    compare_runs,
+    frame_bands,
+    frame_profile,
+    labels_for,
+    largest_plastic_strain,
+    measure_band,
+    run_facts,
+)
+from .read.errors import (
     FieldNotFoundError,
     FrameNotFoundError,
     NoBandError,
@@ -46,38 +73,11 @@ from .errors import (
     ResultError,
     SchemaError,
 )
-from .export import (
-    to_json,
-    write_bands,
-    write_curves,
-    write_points,
-    write_profiles,
-    write_rows,
-)
-from .fields import Field
-from .figures import (
-    band_figure,
-    column_figure,
-    compare_figure,
-    curve_figure,
-    energy_figure,
-    profile_figure,
-    stress_strain_figure,
-)
-from .history import History, read_history
-from .measures import (
-    compare_runs,
-    frame_bands,
-    frame_profile,
-    labels_for,
-    largest_plastic_strain,
-    measure_band,
-    run_facts,
-)
-from .result import SCHEMA, SCHEMA_VERSIONS, Frame, Run
-from .sampling import PointSet
-from .study import StudyError, StudyOptions, run_study
-from .style import save_figure
+from .read.fields import Field
+from .read.history import History, read_history
+from .read.points import PointSet
+from .read.run import SCHEMA, SCHEMA_VERSIONS, Frame, Run
+from .study.run import StudyError, StudyOptions, run_study
 
 __version__ = "0.1.0"
 

@@ -1,0 +1,1 @@
+"""Read what perigeo writes: result files, their frames and fields, and the history."""
