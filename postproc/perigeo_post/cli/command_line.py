@@ -17,7 +17,6 @@ from typing import Any, NoReturn
 
 import numpy as np
 
-from .. import __version__
 from ..draw import figures
 from ..draw.animation import animate
 from ..draw.contours import contour_figure
@@ -29,6 +28,7 @@ from ..read.errors import PostError, RequestError
 from ..read.run import Frame, Run
 from ..report import write as report
 from ..study import run as study
+from ..version import __version__
 
 Arguments = argparse.Namespace
 MOST_PANELS = 6

@@ -28,6 +28,7 @@ import numpy.typing as npt
 
 from ..read.errors import NoBandError, RequestError
 from ..read.points import BoolArray, FloatArray, PointSet
+from .sampling import interpolate
 
 Line = tuple[tuple[float, float], tuple[float, float]]
 
@@ -113,7 +114,7 @@ def profile_along(
     count = int(np.ceil(length / (step or points.spacing / 20.0))) + 1
     t = np.linspace(0.0, 1.0, min(max(count, 3), 200_001))
     x, y = x0 + t * (x1 - x0), y0 + t * (y1 - y0)
-    found = points.interpolate(values, x, y)
+    found = interpolate(points, values, x, y)
     if np.isnan(found).all():
         raise RequestError(
             f"the line from ({x0:g}, {y0:g}) to ({x1:g}, {y1:g}) m does not meet the body"
@@ -201,7 +202,7 @@ def line_across(
     ends = []
     for way in (-1.0, 1.0):
         x, y = start[0] + way * s * step[0], start[1] + way * s * step[1]
-        out = np.isnan(points.interpolate(np.zeros(len(points.points)), x, y))
+        out = np.isnan(interpolate(points, np.zeros(len(points.points)), x, y))
         if extents is not None:
             low, high = np.asarray(extents, dtype=float) + 1e-9 * points.spacing * np.array(
                 [[-1.0], [1.0]]

@@ -13,6 +13,7 @@ import numpy.typing as npt
 from ..read.errors import NoBandError, RequestError
 from ..read.points import BoolArray, FloatArray, PointSet
 from .band import LEVEL, NO_STRAIN, Band, BandSystem, extent_around
+from .sampling import interpolate
 
 END_ZONE = 0.10  # part of the length of a band left out at each end
 CROSSING_ZONE = 1.5  # horizons on either side of the crossing that are left out
@@ -39,7 +40,7 @@ class _Field:
 
     def at(self, t: FloatArray, a: FloatArray) -> FloatArray:
         x, y = (a, t) if self.swap else (t, a)
-        found = self.points.interpolate(self.alpha, x, y)
+        found = interpolate(self.points, self.alpha, x, y)
         slack = 1e-9 * self.scale
         outside = (t < self.lower[0] - slack) | (t > self.upper[0] + slack)
         outside |= (a < self.lower[1] - slack) | (a > self.upper[1] + slack)

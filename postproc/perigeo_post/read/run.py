@@ -6,76 +6,25 @@ program is never disturbed. What the program has not yet written is not shown.
 
 from __future__ import annotations
 
-import os
 import re
-import time
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from types import TracebackType
-from typing import Any
+from typing import Any, TypeVar
 
-import h5py
 import numpy as np
 import numpy.typing as npt
 
 from . import fields as _fields
-from .errors import FieldNotFoundError, FrameNotFoundError, ResultError, SchemaError
+from .errors import FieldNotFoundError, FrameNotFoundError, ResultError
 from .fields import Field
+from .file import checked_attributes, dataset, plain, read, text_of
 from .history import History, read_history
 from .points import BoolArray, FloatArray, PointSet
 
-SCHEMA = "perigeo result"
-SCHEMA_VERSIONS = (1,)
-_ATTEMPTS = 4  # a reading can fall into the moment in which the program writes
-_PAUSE = 0.15  # [s] between them
-
-
-@contextmanager
-def _opened(path: Path) -> Iterator[Any]:
-    os.environ.setdefault("HDF5_USE_FILE_LOCKING", "FALSE")  # for HDF5 without the argument
-    try:
-        try:
-            file = h5py.File(path, "r", locking=False)
-        except (TypeError, ValueError):
-            file = h5py.File(path, "r")
-    except OSError as error:
-        raise ResultError(_why_not(path, error)) from error
-    with file:
-        yield file
-
-
-def _why_not(path: Path, error: OSError) -> str:
-    if not path.exists():
-        return f"there is no file {path}"
-    if path.is_dir():
-        return f"{path} is a folder; name the .h5 file in it"
-    if not os.access(path, os.R_OK):
-        return f"no permission to read {path}"
-    first = str(error).splitlines()[0]
-    return f"{path} cannot be opened as HDF5 (damaged, cut off, or another kind of file): {first}"
-
-
-def _text(value: Any) -> str:
-    if isinstance(value, np.ndarray) and value.size == 1:
-        value = value.reshape(-1)[0]
-    if isinstance(value, bytes):
-        return value.decode("utf-8", errors="replace")
-    return str(value)
-
-
-def _plain(value: Any) -> Any:
-    """An attribute as str, int, float, or list of these."""
-    if isinstance(value, (bytes, str)):
-        return _text(value).strip()
-    array = np.asarray(value)
-    if array.dtype.kind in "SOU":
-        texts = [_text(item).strip() for item in array.reshape(-1)]
-        return texts[0] if array.size == 1 else texts
-    items = array.reshape(-1).tolist()
-    return items[0] if len(items) == 1 else items
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -120,9 +69,9 @@ class Frame:
         return self.field(name).values
 
     def _stored(self, name: str) -> Field | None:
-        found = self.run._dataset(f"{self.key}/{name}", name)
+        found = dataset(self.run.path, f"{self.key}/{name}", name)
         if found is None and name in _fields.OF_THE_POINTS:
-            found = self.run._dataset(f"points/{name}", name)
+            found = dataset(self.run.path, f"points/{name}", name)
         return found
 
 
@@ -135,7 +84,9 @@ class Run:
 
     def __init__(self, path: str | Path) -> None:
         self.path = Path(path)
-        self.attributes: dict[str, Any] = self._read(self._check)
+        self.attributes: dict[str, Any] = self._read(
+            lambda file: checked_attributes(self.path, file)
+        )
         self._points: dict[str, Any] = {}
 
     def __enter__(self) -> Run:
@@ -152,83 +103,13 @@ class Run:
     def __repr__(self) -> str:
         return f"Run({str(self.path)!r})"
 
-    # ---- reading -------------------------------------------------------------------------
-
-    def _read(self, what: Any) -> Any:
-        for attempt in range(_ATTEMPTS):
-            try:
-                with _opened(self.path) as file:
-                    return what(file)
-            except SchemaError:
-                raise
-            except ResultError:
-                if attempt == _ATTEMPTS - 1 or not self._may_be_busy():
-                    raise
-            except (OSError, RuntimeError) as error:
-                if attempt == _ATTEMPTS - 1:
-                    raise ResultError(
-                        f"{self.path} is damaged: {str(error).splitlines()[0]}"
-                    ) from error
-            except (KeyError, ValueError) as error:
-                raise ResultError(f"{self.path} is not complete: {error.args[0]}") from error
-            time.sleep(_PAUSE)
-        raise AssertionError
-
-    def _may_be_busy(self) -> bool:
-        """Whether the file was changed in the last seconds."""
-        try:
-            return time.time() - self.path.stat().st_mtime < 5.0
-        except OSError:
-            return False
-
-    def _check(self, file: Any) -> dict[str, Any]:
-        found = {key: _plain(value) for key, value in file.attrs.items()}
-        if found.get("schema") != SCHEMA:
-            raise SchemaError(
-                f"{self.path} is not a result of perigeo: its attribute 'schema' is "
-                f"{found.get('schema', 'missing')!r}, expected {SCHEMA!r}"
-            )
-        version = found.get("schema_version")
-        if version not in SCHEMA_VERSIONS:
-            known = ", ".join(str(v) for v in SCHEMA_VERSIONS)
-            raise SchemaError(
-                f"{self.path} has schema version {version}, this perigeo-post reads {known}: "
-                "use the perigeo-post that came with the program which wrote it "
-                f"(perigeo {found.get('code_version', 'unknown')})"
-            )
-        for group in ("points", "frames"):
-            if group not in file:
-                raise ResultError(f"{self.path} is not complete: it has no group /{group}")
-        return found
+    def _read(self, what: Callable[[Any], T]) -> T:
+        return read(self.path, what)
 
     def _array(self, name: str) -> npt.NDArray[Any]:
         if name not in self._points:
             self._points[name] = self._read(lambda file: file[name][()])
         return np.asarray(self._points[name])
-
-    def _dataset(self, key: str, name: str) -> Field | None:
-        def read(file: Any) -> Field | None:
-            if key not in file:
-                return None
-            data = file[key]
-            attributes = {k: _plain(v) for k, v in data.attrs.items()}
-            values = np.asarray(data[()], dtype=float)
-            given = attributes.get("components", "")
-            parts = given if isinstance(given, list) else str(given).replace(",", " ").split()
-            if values.ndim == 2 and len(parts) != values.shape[1]:
-                parts = list(_fields.DEFAULT_COMPONENTS.get(values.shape[1], ()))
-            if values.ndim == 1:
-                parts = []
-            return Field(
-                name,
-                values,
-                str(attributes.get("unit", "")),
-                str(attributes.get("description", "")),
-                tuple(str(p) for p in parts),
-            )
-
-        found: Field | None = self._read(read)
-        return found
 
     # ---- what the run is -----------------------------------------------------------------
 
@@ -244,7 +125,7 @@ class Run:
     @property
     def complete(self) -> bool:
         """Whether the run has come to its end (read anew each time)."""
-        return bool(self._read(lambda file: int(_plain(file.attrs.get("complete", 0)))))
+        return bool(self._read(lambda file: int(plain(file.attrs.get("complete", 0)))))
 
     @property
     def spacing(self) -> float:
@@ -306,13 +187,13 @@ class Run:
     @cached_property
     def input_text(self) -> str:
         """The namelist, as it was given."""
-        return _text(self._read(lambda file: file["input/namelist"][()]))
+        return text_of(self._read(lambda file: file["input/namelist"][()]))
 
     @cached_property
     def values(self) -> dict[str, str]:
         """Every input value as used, by "group.key"."""
         lines = self._read(lambda file: file["input/values"][()])
-        pairs = [_text(line).partition("=") for line in np.atleast_1d(lines)]
+        pairs = [text_of(line).partition("=") for line in np.atleast_1d(lines)]
         found: dict[str, str] = {}
         for key, _, value in pairs:
             found.setdefault(key.strip(), value.strip())
@@ -362,7 +243,7 @@ class Run:
         names = self._read(
             lambda f: f["points/boundary_names"][()] if "points/boundary_names" in f else []
         )
-        return [_text(name).strip() for name in np.atleast_1d(names)]
+        return [text_of(name).strip() for name in np.atleast_1d(names)]
 
     @cached_property
     def body_points(self) -> PointSet:
@@ -402,7 +283,7 @@ class Run:
         return [f for f in self._read(read) if f.written and (f.valid or include_invalid)]
 
     def _frame(self, file: Any, key: str, number: int | None) -> Frame:
-        found = {name: _plain(value) for name, value in file[key].attrs.items()}
+        found = {name: plain(value) for name, value in file[key].attrs.items()}
         return Frame(
             self,
             key,

@@ -1,7 +1,7 @@
 """Namelist texts of the program: taken apart, changed, put together again.
 
-The scanner follows that of the program (src/input/pd_namelist.f90). Comments are left out, values stay as
-they are written. What groups and keys mean is the program's business.
+The scanner follows that of the program (src/input/pd_namelist.f90). Comments are left out, values
+stay as they are written. What groups and keys mean is the program's business.
 """
 
 from __future__ import annotations
