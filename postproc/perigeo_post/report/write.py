@@ -1,4 +1,4 @@
-"""`perigeo-post report`: one page with all studies, `results/report.html`.
+"""One page with all studies, `results/report.html`.
 
 The page holds everything itself: it opens without a network, on a phone too. It is a function of
 the results alone, so the same results give the same page.
@@ -6,24 +6,13 @@ the results alone, so the same results give the same page.
 
 from __future__ import annotations
 
-import argparse
-import sys
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..read.errors import OutputError, RequestError, ResultError
+from ..read.errors import OutputError, RequestError
 from .check import LARGE, check_report
 from .data import FAILED, MISSING, Material, gather
 from .page import Page
-from .publish import publish
-
-__all__ = [
-    "Report", "add_options", "carry_out", "check_report", "gather", "publish", "write_report",
-]  # fmt: skip
-
-
-STUDIES = Path("studies")  # where the study files are looked for
-DOCUMENT = Path("doc/verification.md")
 
 
 @dataclass(frozen=True)
@@ -82,41 +71,3 @@ def write_report(
         raise OutputError(f"cannot write {output}: {error.strerror or error}") from error
     size = len(text.encode("utf-8"))
     return Report(output, material, page.problems, check_report(output), size)
-
-
-# ---- the command ---------------------------------------------------------------------------------
-
-
-def add_options(parser: argparse.ArgumentParser) -> None:
-    """The options of `perigeo-post report`."""
-    parser.add_argument("--results", metavar="DIR", type=Path, default=Path("results"),
-                        help="folder of the results (default: results)")  # fmt: skip
-    parser.add_argument("-o", "--output", metavar="FILE", type=Path,
-                        help="page to write (default: report.html in that folder)")  # fmt: skip
-    parser.add_argument(
-        "--studies", metavar="DIR", type=Path,
-        help="folder of the study files; those without results are named (default: studies, "
-        "where it is there)",
-    )  # fmt: skip
-    parser.add_argument(
-        "--publish", metavar="DOCUMENT", type=Path, nargs="?", const=DOCUMENT,
-        help="also write the tables between the markers of this document (default: "
-        "doc/verification.md)",
-    )  # fmt: skip
-
-
-def carry_out(args: argparse.Namespace) -> None:
-    """Write the report, say what is missing; an error where something is broken."""
-    studies = args.studies or (STUDIES if STUDIES.is_dir() else None)
-    if studies is not None and not studies.is_dir():
-        raise RequestError(f"there is no folder {studies}")
-    report = write_report(args.results, args.output, studies)
-    print(f"wrote {report.path}")
-    for line in report.remarks():
-        print(f"perigeo-post: {line}", file=sys.stderr)
-    if report.faults:
-        raise OutputError(f"{report.path} is not as it should be; see above")
-    if report.unreadable:
-        raise ResultError(f"{report.path} lacks what could not be read; see above")
-    if args.publish is not None:
-        print(f"wrote {publish(report.material, args.publish)}")

@@ -28,6 +28,14 @@ from .types import StudyRun, Value
 
 SCHEMA = "perigeo study"
 SCHEMA_VERSION = 1
+# What the numbers and verdicts of a study come from.
+MEASURING = (
+    "read/*.py",
+    "measure/*.py",
+    "study/measures.py",
+    "study/expressions.py",
+    "study/findings.py",
+)
 STATUS = {"done": "done", "failed": "failed"}  # of a job; anything else is missing
 
 
@@ -265,11 +273,20 @@ def _processor() -> str:
     return platform.processor() or platform.machine() or "unknown"
 
 
+def measuring_files() -> list[Path]:
+    """The sources from which the numbers of a study come."""
+    package = Path(__file__).parents[1]
+    return sorted(path for pattern in MEASURING for path in package.glob(pattern))
+
+
 def fingerprint(outcome: Outcome) -> str:
-    """Changes with anything that tables and figures depend on."""
+    """Changes with anything that the tables depend on: the study, its results, what measures them.
+
+    Not with how figures are drawn or what the command line says: --figures-only draws anew.
+    """
     digest = hashlib.sha256(outcome.study.path.read_bytes())
     digest.update(f"{np.__version__} {matplotlib.__version__}".encode())
-    for path in sorted(Path(__file__).parents[1].rglob("*.py")):
+    for path in measuring_files():
         digest.update(path.read_bytes())
     for run in outcome.study.runs:
         job = outcome.jobs[run.id]
