@@ -52,6 +52,7 @@ def _why_not(path: Path, error: OSError) -> str:
 
 
 def text_of(value: Any) -> str:
+    """A string of the file, however it is stored."""
     if isinstance(value, np.ndarray) and value.size == 1:
         value = value.reshape(-1)[0]
     if isinstance(value, bytes):
