@@ -135,11 +135,11 @@ contains
     end if
 
     if (checkpoint%history_rows > 0) then
-      state = state%scattered(model%body%points, model%body%n)
+      state = state%scattered(model%operators%storage%row, model%operators%n)
       state%strength = model%strength
       call ledger%fit(model%blocks)
       call model%operators%take_in(state%displacement)
-      call boundary_forces(model%body%position, model%body%volume, clock%time(), state%force, &
+      call boundary_forces(model%points%position, model%points%volume, clock%time(), state%force, &
         model%boundaries)
     else
       call start(model, state)
@@ -266,10 +266,10 @@ contains
     type(error_list_t) :: file_errors
     character(160) :: where
 
-    associate (p => failed_point, x => model%body%position)
+    associate (p => failed_point, x => model%points%position)
       write (where, '(a,i0,a,es12.5,a,i0,a,g0.7,a,g0.7,a)') 'step ', step, ', time ', &
         clock%time(), ' s, point ', &
-        count(model%body%points <= p), ' at (', x(p, 1), ', ', x(p, 2), ') m'
+        model%operators%storage%point_at(p), ' at (', x(p, 1), ', ', x(p, 2), ') m'
     end associate
     call record_failure(model, state, clock, record, file_errors)
     call record_line(record, 'the calculation failed: '//reason//'; '//trim(where), file_errors)

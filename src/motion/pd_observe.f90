@@ -180,7 +180,7 @@ contains
       end if
       rows(lo:lo + n - 1, :) = in_block(:n, :size(rows, 2))
     end do
-    values = transpose(rows(model%body%points, :))
+    values = transpose(rows(model%operators%storage%row, :))
   end subroutine point_field
 
 end module pd_observe

@@ -133,12 +133,11 @@ contains
     description%lower = model%body%lower
     description%upper = model%body%upper
     description%steps = schedule%steps
-    associate (body => model%body, places => model%body%points)
-      description%position = body%position(places, :)
-      description%volume = body%volume(places)
-      description%boundary = body%boundary(places)
-      if (model%materials%columns() > 0) description%yield_stress = model%strength(places)
-    end associate
+    description%position = model%body%position
+    description%volume = model%body%volume
+    description%boundary = model%body%boundary
+    if (model%materials%columns() > 0) &
+      description%yield_stress = model%strength(model%operators%storage%row)
     allocate (character(64) :: description%boundary_names(size(model%boundaries)))
     do k = 1, size(model%boundaries)
       description%boundary_names(k) = model%boundaries(k)%name
@@ -244,7 +243,7 @@ contains
   pure integer function points_of_state(self) result(n)
     class(state_frame_t), intent(in) :: self
 
-    n = size(self%model%body%points)
+    n = self%model%body%n
   end function points_of_state
 
   !> A field of a frame.
@@ -308,16 +307,15 @@ contains
     checkpoint%ledger_blocks(:, 2) = ledger%damping
     checkpoint%ledger_blocks(:, 3) = ledger%frame_work
     checkpoint%input = record%values
-    associate (body => model%body, places => model%body%points)
-      checkpoint%position = body%position(places, :)
-      checkpoint%volume = body%volume(places)
-      checkpoint%boundary = body%boundary(places)
-      call write_checkpoint(record%stem, checkpoint, state%gathered(places), errors)
-    end associate
+    checkpoint%position = model%body%position
+    checkpoint%volume = model%body%volume
+    checkpoint%boundary = model%body%boundary
+    call write_checkpoint(record%stem, checkpoint, &
+      state%gathered(model%operators%storage%row), errors)
   end subroutine save_checkpoint
 
   !> Read the newest checkpoint and compare its input with the present one. The state has the points
-  !> of the body, without voids.
+  !> of the body.
   !>
   !> Errors, `file_errors`: no checkpoint that can be read; `input_errors`: values that differ.
   subroutine load_checkpoint(input, checkpoint, state, ledger, warning, file_errors, input_errors)
@@ -350,10 +348,10 @@ contains
     type(checkpoint_t), intent(in) :: checkpoint
     type(body_t),       intent(in) :: body
 
-    same = size(checkpoint%volume) == size(body%points)
-    if (same) same = all(abs(checkpoint%position - body%position(body%points, :)) <= 0.0_wp) &
-      .and. all(abs(checkpoint%volume - body%volume(body%points)) <= 0.0_wp) &
-      .and. all(checkpoint%boundary == body%boundary(body%points))
+    same = size(checkpoint%volume) == body%n
+    if (same) same = all(abs(checkpoint%position - body%position) <= 0.0_wp) &
+      .and. all(abs(checkpoint%volume - body%volume) <= 0.0_wp) &
+      .and. all(checkpoint%boundary == body%boundary)
   end function same_points
 
 end module pd_record
