@@ -68,6 +68,7 @@ stage "compiler warnings" compiler_warnings
 stage "fortitude" $bin/fortitude check --no-show-fixes src tests
 stage "layers" layers
 stage "limits" limits
+stage "layers of perigeo_post" $bin/python tools/check_python_layers.py
 stage "layout of the text" layout
 stage "spelling" spelling
 stage "shell scripts" shell_scripts

@@ -7,6 +7,7 @@ program perigeo
   use omp_lib, only: omp_get_max_threads, omp_set_num_threads
   use pd_boundary, only: boundary_forces
   use pd_checkpoint, only: checkpoint_t
+  use pd_clock, only: clock_t
   use pd_command_line, only: options_t, print_help, read_command_line
   use pd_errors, only: error_list_t, exit_calculation, exit_command_line, exit_file, exit_input, &
     exit_interrupted, exit_model, exit_ok, exit_terminated, stop_if_any
@@ -14,19 +15,21 @@ program perigeo
   use pd_input_reference, only: write_input_reference
   use pd_input_types, only: input_t
   use pd_kinds, only: wp
-  use pd_observe, only: ledger_t, observation_t, observe, running_away
+  use pd_ledger, only: ledger_t, new_ledger
+  use pd_observe, only: observation_t, observe, running_away
   use pd_progress, only: progress_due
   use pd_record, only: close_record, load_checkpoint, observe_state, open_record, record_failure, &
     record_frame, record_line, record_progress, record_row, record_t, results_in_the_way, &
     same_points, save_checkpoint
   use pd_schedule, only: row_due, schedule_t
-  use pd_model, only: find_highest_frequency, model_t, start
+  use pd_model, only: model_t, start
   use pd_setup, only: set_up_body, set_up_model, set_up_schedule
+  use pd_stability, only: find_highest_frequency
   use pd_state, only: state_t
   use pd_step, only: step_work_t, take_step
   use pd_summary, only: estimated_seconds, summarise, summary_t
   use pd_system, only: catch_signals, exit_program, pending_signal, sigint
-  use pd_timing, only: kernel_names, timing_t
+  use pd_timing, only: kernel_history, kernel_names, timing_t
   use pd_version, only: code_version, git_hash
   implicit none
 
@@ -41,6 +44,7 @@ program perigeo
   type(model_t)      :: model
   type(schedule_t)   :: schedule
   type(state_t)      :: state
+  type(clock_t)      :: clock
   type(ledger_t)     :: ledger
   type(record_t)     :: record
   type(timing_t)     :: timing
@@ -60,9 +64,9 @@ program perigeo
   call system_clock(last_checkpoint)
   loop_start = last_checkpoint
 
-  do step = checkpoint%step + 1, schedule%steps
+  do step = clock%step + 1, schedule%steps
     due = due_after(step)
-    call take_step(step, due%row .or. due%frame .or. due%checkpoint, model, state, work, ledger, &
+    call take_step(clock, due%row .or. due%frame .or. due%checkpoint, model, state, work, ledger, &
       timing, failed_point)
     if (failed_point > 0) call fail('det F is not positive, or not a number')
     call write_what_is_due()
@@ -112,13 +116,15 @@ contains
     end if
     call set_up_model(input, model, errors)
     call stop_if_any(errors, exit_model)
-    call set_up_schedule(input, checkpoint%time_step, model, schedule, errors)
+    clock = checkpoint%clock
+    call set_up_schedule(input, clock, model, schedule, errors)
+    checkpoint%clock = clock
     call stop_if_any(errors, exit_input)
     if (options%check) then
       call find_highest_frequency(model)
-      if (schedule%time_step * model%highest_frequency > 2.0_wp) call warnings%add('the time '// &
+      if (clock%time_step * model%highest_frequency > 2.0_wp) call warnings%add('the time '// &
         'step is larger than the stable one: the run will not last', '&integration')
-      summary = summarise(input, model, schedule)
+      summary = summarise(input, model, clock, schedule)
       write (output_unit, '(a)') options%input_path//': the input is right'
       do i = 1, size(summary%lines)
         write (output_unit, '(a)') trim(summary%lines(i))
@@ -128,14 +134,17 @@ contains
       call exit_program(exit_ok)
     end if
 
-    allocate (work%a(model%body%n, 4), source=0.0_wp)   ! voids stay zero
     if (checkpoint%history_rows > 0) then
-      state = state%scattered(model%body%points, model%body%n)
-      call boundary_forces(model%body%position, model%body%volume, checkpoint%time, &
-        state%force, model%boundaries)
+      state = state%scattered(model%operators%storage%row, model%operators%n)
+      state%strength = model%strength
+      call ledger%fit(model%blocks)
+      call model%operators%take_in(state%displacement)
+      call boundary_forces(model%points%position, model%points%volume, clock%time(), state%force, &
+        model%boundaries)
     else
       call start(model, state)
-      call observe(model%body, model%solid, model%operators, state, ledger, seen)
+      ledger = new_ledger(model%blocks)
+      call observe(model, state, ledger, seen)
       ledger%initial_kinetic_energy = seen%kinetic_energy
     end if
   end subroutine set_up
@@ -181,7 +190,7 @@ contains
     call stop_if_any(errors, exit_file)
     call record_line(record, 'perigeo '//code_version//' ('//git_hash//'), '//options%input_path, &
       errors)
-    summary = summarise(input, model, schedule)
+    summary = summarise(input, model, clock, schedule)
     do i = 1, size(summary%lines)
       call record_line(record, trim(summary%lines(i)), errors)
     end do
@@ -190,12 +199,12 @@ contains
     end do
     call observe_state(model, state, ledger, record)
     if (checkpoint%history_rows == 0) then
-      call record_row(model, state, 0, record, errors)
-      if (errors%count() == 0) call record_frame(model, state, 0, record, errors)
+      call record_row(model, state, clock, record, errors)
+      if (errors%count() == 0) call record_frame(model, state, clock, record, errors)
     else
       call record_line(record, 'going on from a checkpoint', errors)
     end if
-    call record_progress(model, state, schedule, checkpoint%step, record, errors)
+    call record_progress(model, state, schedule, clock, record, errors)
     call stop_if_any(errors, exit_file)
   end subroutine open_outputs
 
@@ -221,6 +230,7 @@ contains
     integer :: k
 
     if (due%row .or. due%frame .or. due%checkpoint) then
+      call ledger%note_work(model%blocks)
       call observe_state(model, state, ledger, record)
       ! After the first step from rest loads have given half a kick, and no work has been done yet.
       if (step > 1 .and. running_away(record%seen, ledger)) then
@@ -228,18 +238,18 @@ contains
         call fail('the energy runs away')
       end if
     end if
-    if (due%row) call record_row(model, state, step, record, errors)
+    if (due%row) call record_row(model, state, clock, record, errors)
     if (progress_due(record%progress, step, schedule%steps)) &
-      call record_progress(model, state, schedule, step, record, errors)
-    call timing%lap(7)
+      call record_progress(model, state, schedule, clock, record, errors)
+    call timing%lap(kernel_history)
 
     if (due%frame) then
       do k = 1, size(schedule%frame_steps)
-        if (schedule%frame_steps(k) == step) call record_frame(model, state, step, record, errors)
+        if (schedule%frame_steps(k) == step) call record_frame(model, state, clock, record, errors)
       end do
     end if
     if (due%checkpoint) then
-      call save_checkpoint(model, state, ledger, step, record, errors)
+      call save_checkpoint(model, state, ledger, clock, record, errors)
       call system_clock(last_checkpoint)
     end if
     call stop_if_any(errors, exit_file)
@@ -247,7 +257,7 @@ contains
 
   !> Where a run that runs away moves fastest, of the points that move freely.
   integer function fastest_point()
-    fastest_point = maxloc(sum((model%free * state%velocity)**2, dim=2), dim=1)
+    fastest_point = maxloc(sum((model%points%free * state%velocity)**2, dim=2), dim=1)
   end function fastest_point
 
   !> The calculation has failed: keep the failing state apart from the good frames, and say where.
@@ -256,12 +266,12 @@ contains
     type(error_list_t) :: file_errors
     character(160) :: where
 
-    associate (p => failed_point, x => model%body%position)
+    associate (p => failed_point, x => model%points%position)
       write (where, '(a,i0,a,es12.5,a,i0,a,g0.7,a,g0.7,a)') 'step ', step, ', time ', &
-        real(step, wp) * schedule%time_step, ' s, point ', &
-        count(model%body%points <= p), ' at (', x(p, 1), ', ', x(p, 2), ') m'
+        clock%time(), ' s, point ', &
+        model%operators%storage%point_at(p), ' at (', x(p, 1), ', ', x(p, 2), ') m'
     end associate
-    call record_failure(model, state, step, record, file_errors)
+    call record_failure(model, state, clock, record, file_errors)
     call record_line(record, 'the calculation failed: '//reason//'; '//trim(where), file_errors)
     call errors%add('the calculation failed: '//reason//'; the frames and rows before this '// &
       'step are good; a smaller safety or time step may help', trim(where))
@@ -290,9 +300,9 @@ contains
     call system_clock(now, rate)
     whole = real(now - loop_start, wp) / real(rate, wp)
     write (line, '(a,f10.3,a,i0)') 'time loop ', whole, ' s, steps ', &
-      schedule%steps - checkpoint%step
+      schedule%steps - checkpoint%clock%step
     call record_line(record, trim(line), errors)
-    write (line, '(a,8(2x,a,f9.3))') 'kernels [s] ', &
+    write (line, '(a,7(2x,a,f9.3))') 'kernels [s] ', &
       (trim(kernel_names(k)), timing%seconds(k), k=1, size(kernel_names)), 'frames', &
       max(0.0_wp, whole - sum(timing%seconds))
     call record_line(record, trim(line), errors)

@@ -1,21 +1,20 @@
 !> The state of a run: everything that changes from step to step at the points.
 module pd_state
-  use pd_kinds, only: n_block, wp
+  use pd_blocks, only: blocks_t
+  use pd_kinds, only: wp
+  use pd_law, only: law_points_t
   implicit none
   private
 
   public :: state_t, block_work_t
 
-  !> Fields over all n points, fictitious ones included.
-  type :: state_t
-    real(wp), allocatable :: displacement(:, :)          !! u (n,2) [m]
-    real(wp), allocatable :: velocity(:, :)              !! v (n,2) [m/s]
-    real(wp), allocatable :: force(:, :)                 !! internal force density f (n,2) [N/m^3]
-    real(wp), allocatable :: deformation_gradient(:, :)  !! F (n,4) xx xy yx yy
-    real(wp), allocatable :: stress(:, :)                !! S (n,4) xx yy zz xy [Pa]
-    real(wp), allocatable :: plastic_strain(:, :)        !! E^p (n,4) xx yy zz xy
-    real(wp), allocatable :: back_stress(:, :)           !! beta (n,4) xx yy zz xy [Pa]
-    real(wp), allocatable :: alpha(:)                    !! equivalent plastic strain (n)
+  !> Fields over all rows, fictitious points included; stress, history and strength belong to the
+  !> laws.
+  type, extends(law_points_t) :: state_t
+    real(wp), allocatable :: displacement(:, :)            !! u (n,2) [m]
+    real(wp), allocatable :: velocity(:, :)                !! v (n,2) [m/s]
+    real(wp), allocatable :: force(:, :)                   !! force density f (n,2) [N/m^3]
+    real(wp), allocatable :: displacement_gradient(:, :)   !! H = F - I (n,4) xx xy yx yy
   contains
     procedure :: allocate => allocate_state
     procedure :: gathered
@@ -35,66 +34,61 @@ module pd_state
 
 contains
 
-  !> Make room for the blocks of points first to last.
-  subroutine fit(self, first, last)
+  !> Make room for some blocks.
+  subroutine fit(self, blocks)
     class(block_work_t), intent(inout) :: self
-    integer,             intent(in)    :: first, last
-    integer :: n_blocks
+    type(blocks_t),      intent(in)    :: blocks
 
-    n_blocks = (last - first) / n_block + 1
     if (allocated(self%failed)) then
-      if (size(self%failed) == n_blocks) return
+      if (size(self%failed) == blocks%count) return
       deallocate (self%damping, self%dissipated, self%failed, self%times)
     end if
-    allocate (self%damping(4, n_blocks), self%dissipated(n_blocks), self%times(3, n_blocks), &
-      source=0.0_wp)
-    allocate (self%failed(n_blocks), source=0)
+    allocate (self%damping(4, blocks%count), self%dissipated(blocks%count), &
+      self%times(3, blocks%count), source=0.0_wp)
+    allocate (self%failed(blocks%count), source=0)
   end subroutine fit
 
-  !> The unloaded state of n points.
-  subroutine allocate_state(self, n)
+  !> The unloaded state of n rows, whose points remember `columns` numbers.
+  subroutine allocate_state(self, n, columns)
     class(state_t), intent(out) :: self
-    integer,        intent(in)  :: n
+    integer,        intent(in)  :: n, columns
 
     allocate (self%displacement(n, 2), self%velocity(n, 2), self%force(n, 2), source=0.0_wp)
-    allocate (self%deformation_gradient(n, 4), source=0.0_wp)
-    self%deformation_gradient(:, [1, 4]) = 1.0_wp
-    allocate (self%stress(n, 4), self%plastic_strain(n, 4), self%back_stress(n, 4), source=0.0_wp)
-    allocate (self%alpha(n), source=0.0_wp)
+    allocate (self%displacement_gradient(n, 4), self%stress(n, 4), source=0.0_wp)
+    allocate (self%history(n, columns), self%strength(n), source=0.0_wp)
   end subroutine allocate_state
 
-  !> The state of some places only, in their order.
-  function gathered(self, places) result(state)
+  !> The state of some rows only, in their order.
+  function gathered(self, rows) result(state)
     class(state_t), intent(in) :: self
-    integer,        intent(in) :: places(:)
+    integer,        intent(in) :: rows(:)
     type(state_t) :: state
+    integer :: n
 
-    allocate (state%displacement(size(places), 2), source=self%displacement(places, :))
-    allocate (state%velocity(size(places), 2), source=self%velocity(places, :))
-    allocate (state%force(size(places), 2), source=self%force(places, :))
-    allocate (state%deformation_gradient(size(places), 4), &
-      source=self%deformation_gradient(places, :))
-    allocate (state%stress(size(places), 4), source=self%stress(places, :))
-    allocate (state%plastic_strain(size(places), 4), source=self%plastic_strain(places, :))
-    allocate (state%back_stress(size(places), 4), source=self%back_stress(places, :))
-    allocate (state%alpha(size(places)), source=self%alpha(places))
+    n = size(rows)
+    allocate (state%displacement(n, 2), source=self%displacement(rows, :))
+    allocate (state%velocity(n, 2), source=self%velocity(rows, :))
+    allocate (state%force(n, 2), source=self%force(rows, :))
+    allocate (state%displacement_gradient(n, 4), source=self%displacement_gradient(rows, :))
+    allocate (state%stress(n, 4), source=self%stress(rows, :))
+    allocate (state%history(n, size(self%history, 2)), source=self%history(rows, :))
+    allocate (state%strength(n), source=self%strength(rows))
   end function gathered
 
-  !> The state of n places from that of some of them; the others are unloaded and at rest.
-  function scattered(self, places, n) result(state)
+  !> The state of n rows from that of some of them; the others are unloaded and at rest.
+  function scattered(self, rows, n) result(state)
     class(state_t), intent(in) :: self
-    integer,        intent(in) :: places(:), n
+    integer,        intent(in) :: rows(:), n
     type(state_t) :: state
 
-    call state%allocate(n)
-    state%displacement(places, :) = self%displacement
-    state%velocity(places, :) = self%velocity
-    state%force(places, :) = self%force
-    state%deformation_gradient(places, :) = self%deformation_gradient
-    state%stress(places, :) = self%stress
-    state%plastic_strain(places, :) = self%plastic_strain
-    state%back_stress(places, :) = self%back_stress
-    state%alpha(places) = self%alpha
+    call state%allocate(n, size(self%history, 2))
+    state%displacement(rows, :) = self%displacement
+    state%velocity(rows, :) = self%velocity
+    state%force(rows, :) = self%force
+    state%displacement_gradient(rows, :) = self%displacement_gradient
+    state%stress(rows, :) = self%stress
+    state%history(rows, :) = self%history
+    state%strength(rows) = self%strength
   end function scattered
 
 end module pd_state

@@ -6,6 +6,7 @@ module pd_record
   use pd_boundary, only: nominal_strain
   use pd_checkpoint, only: checkpoint_exists, checkpoint_t, read_checkpoint, remove_checkpoints, &
     write_checkpoint
+  use pd_clock, only: clock_t
   use pd_errors, only: error_list_t
   use pd_files, only: prepare_folder
   use pd_geometry, only: body_t
@@ -14,7 +15,8 @@ module pd_record
   use pd_input, only: compare_used, used_values
   use pd_input_types, only: input_t
   use pd_kinds, only: wp
-  use pd_observe, only: ledger_t, observation_t, observe, point_field
+  use pd_ledger, only: ledger_t
+  use pd_observe, only: observation_t, observe, point_field
   use pd_progress, only: close_progress, open_progress, progress_t, say, show_progress, status_t
   use pd_result, only: create_result, finish_result, frame_source_t, provenance_t, &
     result_exists, result_t, resume_result, run_description_t, write_failed_frame, write_frame
@@ -49,8 +51,8 @@ module pd_record
     procedure :: field => field_of_state
   end type state_frame_t
 
-  character(*), parameter :: ledger_names(5) = [character(24) :: 'initial_kinetic_energy', &
-    'plastic_dissipation', 'damping_dissipation', 'external_work', 'largest_work']
+  character(*), parameter :: ledger_names(3) = [character(24) :: 'initial_kinetic_energy', &
+    'largest_work', 'outer_work']
 
 contains
 
@@ -85,13 +87,14 @@ contains
     restart = checkpoint%history_rows > 0
     platens = model%platens%axis > 0
     call describe_run(input, command, threads, model, schedule, description)
+    description%time_step = checkpoint%clock%time_step
     description%values = record%values
     call prepare_folder(input%run%output_dir, errors)
     if (errors%count() > 0) return
     if (restart) then
-      n_new = count(schedule%frame_steps > checkpoint%step)
+      n_new = count(schedule%frame_steps > checkpoint%clock%step)
       call resume_result(record%result, record%stem, description, checkpoint%frames_written, &
-        n_new, checkpoint%step, errors)
+        n_new, checkpoint%clock%step, errors)
       if (errors%count() == 0) call resume_history(record%history, record%stem, &
         description%boundary_names, platens, checkpoint%history_rows, errors)
       record%frames = checkpoint%frames_written
@@ -129,15 +132,12 @@ contains
     description%horizon = model%delta
     description%lower = model%body%lower
     description%upper = model%body%upper
-    description%time_step = schedule%time_step
     description%steps = schedule%steps
-    associate (body => model%body, places => model%body%points)
-      description%position = body%position(places, :)
-      description%volume = body%volume(places)
-      description%boundary = body%boundary(places)
-      if (model%solid%material%plastic) &
-        description%yield_stress = model%solid%yield_stress(places)
-    end associate
+    description%position = model%body%position
+    description%volume = model%body%volume
+    description%boundary = model%body%boundary
+    if (model%materials%columns() > 0) &
+      description%yield_stress = model%strength(model%operators%storage%row)
     allocate (character(64) :: description%boundary_names(size(model%boundaries)))
     do k = 1, size(model%boundaries)
       description%boundary_names(k) = model%boundaries(k)%name
@@ -156,26 +156,26 @@ contains
 
   !> Observe the state; what is seen stays in the record.
   subroutine observe_state(model, state, ledger, record)
-    type(model_t),  intent(inout) :: model      !! work space of its operators
+    type(model_t),  intent(in)    :: model
     type(state_t),  intent(in)    :: state
     type(ledger_t), intent(in)    :: ledger
     type(record_t), intent(inout) :: record
 
-    call observe(model%body, model%solid, model%operators, state, ledger, record%seen)
+    call observe(model, state, ledger, record%seen)
   end subroutine observe_state
 
   !> Write a row of the history with what was seen of the state.
-  subroutine record_row(model, state, step, record, errors)
+  subroutine record_row(model, state, clock, record, errors)
     type(model_t),      intent(in)    :: model
     type(state_t),      intent(in)    :: state
-    integer,            intent(in)    :: step
+    type(clock_t),      intent(in)    :: clock
     type(record_t),     intent(inout) :: record
     type(error_list_t), intent(inout) :: errors
     type(history_row_t) :: row
     integer :: k
 
-    row%step = step
-    row%time = real(step, wp) * model%motion%time_step
+    row%step = clock%step
+    row%time = clock%time()
     row%strain = strain_at(model, state, row%time)
     allocate (row%force(size(model%boundaries), 2))
     do k = 1, size(model%boundaries)
@@ -209,45 +209,41 @@ contains
   end function strain_at
 
   !> Write the next frame.
-  subroutine record_frame(model, state, step, record, errors)
+  subroutine record_frame(model, state, clock, record, errors)
     type(model_t), target, intent(in) :: model
     type(state_t), target, intent(in) :: state
-    integer,            intent(in)    :: step
+    type(clock_t),      intent(in)    :: clock
     type(record_t),     intent(inout) :: record
     type(error_list_t), intent(inout) :: errors
     type(state_frame_t) :: source
-    real(wp) :: time
 
-    time = real(step, wp) * model%motion%time_step
     source%model => model
     source%state => state
-    call write_frame(record%result, record%frames, step, time, strain_at(model, state, time), &
-      source, errors)
+    call write_frame(record%result, record%frames, clock%step, clock%time(), &
+      strain_at(model, state, clock%time()), source, errors)
     record%frames = record%frames + 1
   end subroutine record_frame
 
   !> Write the state of a run that has failed, marked as not valid.
-  subroutine record_failure(model, state, step, record, errors)
+  subroutine record_failure(model, state, clock, record, errors)
     type(model_t), target, intent(in) :: model
     type(state_t), target, intent(in) :: state
-    integer,            intent(in)    :: step
+    type(clock_t),      intent(in)    :: clock
     type(record_t),     intent(inout) :: record
     type(error_list_t), intent(inout) :: errors
     type(state_frame_t) :: source
-    real(wp) :: time
 
-    time = real(step, wp) * model%motion%time_step
     source%model => model
     source%state => state
-    call write_failed_frame(record%result, step, time, strain_at(model, state, time), source, &
-      errors)
+    call write_failed_frame(record%result, clock%step, clock%time(), &
+      strain_at(model, state, clock%time()), source, errors)
   end subroutine record_failure
 
   !> Points of a frame.
   pure integer function points_of_state(self) result(n)
     class(state_frame_t), intent(in) :: self
 
-    n = size(self%model%body%points)
+    n = self%model%body%n
   end function points_of_state
 
   !> A field of a frame.
@@ -256,23 +252,22 @@ contains
     character(*), intent(in)  :: name
     real(wp),     intent(out), contiguous :: values(:, :)   !! (components,points)
 
-    call point_field(name, self%model%body, self%model%operators, self%state, self%model%delta, &
-      values)
+    call point_field(name, self%model, self%state, values)
   end subroutine field_of_state
 
   !> Show where the run stands; axial stress and largest alpha are those of the last row.
-  subroutine record_progress(model, state, schedule, step, record, errors)
+  subroutine record_progress(model, state, schedule, clock, record, errors)
     type(model_t),      intent(in)    :: model
     type(state_t),      intent(in)    :: state
     type(schedule_t),   intent(in)    :: schedule
-    integer,            intent(in)    :: step
+    type(clock_t),      intent(in)    :: clock
     type(record_t),     intent(inout) :: record
     type(error_list_t), intent(inout) :: errors
     type(status_t) :: status
 
-    status%step = step
+    status%step = clock%step
     status%steps = schedule%steps
-    status%time = real(step, wp) * schedule%time_step
+    status%time = clock%time()
     status%largest_alpha = record%seen%max_plastic_strain
     if (model%platens%axis > 0) then
       status%has_strain = .true.
@@ -293,34 +288,34 @@ contains
   end subroutine record_line
 
   !> Write a checkpoint of the state after a step and its outputs.
-  subroutine save_checkpoint(model, state, ledger, step, record, errors)
+  subroutine save_checkpoint(model, state, ledger, clock, record, errors)
     type(model_t),      intent(in)    :: model
     type(state_t),      intent(in)    :: state
     type(ledger_t),     intent(in)    :: ledger
-    integer,            intent(in)    :: step
+    type(clock_t),      intent(in)    :: clock
     type(record_t),     intent(in)    :: record
     type(error_list_t), intent(inout) :: errors
     type(checkpoint_t) :: checkpoint
 
-    checkpoint%step = step
-    checkpoint%time_step = model%motion%time_step
-    checkpoint%time = real(step, wp) * checkpoint%time_step
+    checkpoint%clock = clock
     checkpoint%history_rows = record%history%rows
     checkpoint%frames_written = record%frames
     checkpoint%ledger_names = ledger_names
-    checkpoint%ledger = [ledger%initial_kinetic_energy, ledger%plastic_dissipation, &
-      ledger%damping_dissipation, ledger%external_work, ledger%largest_work]
+    checkpoint%ledger = [ledger%initial_kinetic_energy, ledger%largest_work, ledger%outer_work]
+    allocate (checkpoint%ledger_blocks(size(ledger%plastic), 3))
+    checkpoint%ledger_blocks(:, 1) = ledger%plastic
+    checkpoint%ledger_blocks(:, 2) = ledger%damping
+    checkpoint%ledger_blocks(:, 3) = ledger%frame_work
     checkpoint%input = record%values
-    associate (body => model%body, places => model%body%points)
-      checkpoint%position = body%position(places, :)
-      checkpoint%volume = body%volume(places)
-      checkpoint%boundary = body%boundary(places)
-      call write_checkpoint(record%stem, checkpoint, state%gathered(places), errors)
-    end associate
+    checkpoint%position = model%body%position
+    checkpoint%volume = model%body%volume
+    checkpoint%boundary = model%body%boundary
+    call write_checkpoint(record%stem, checkpoint, &
+      state%gathered(model%operators%storage%row), errors)
   end subroutine save_checkpoint
 
   !> Read the newest checkpoint and compare its input with the present one. The state has the points
-  !> of the body, without voids.
+  !> of the body.
   !>
   !> Errors, `file_errors`: no checkpoint that can be read; `input_errors`: values that differ.
   subroutine load_checkpoint(input, checkpoint, state, ledger, warning, file_errors, input_errors)
@@ -339,10 +334,11 @@ contains
       return
     end if
     ledger%initial_kinetic_energy = checkpoint%ledger(1)
-    ledger%plastic_dissipation = checkpoint%ledger(2)
-    ledger%damping_dissipation = checkpoint%ledger(3)
-    ledger%external_work = checkpoint%ledger(4)
-    ledger%largest_work = checkpoint%ledger(5)
+    ledger%largest_work = checkpoint%ledger(2)
+    ledger%outer_work = checkpoint%ledger(3)
+    ledger%plastic = checkpoint%ledger_blocks(:, 1)
+    ledger%damping = checkpoint%ledger_blocks(:, 2)
+    ledger%frame_work = checkpoint%ledger_blocks(:, 3)
     call compare_used(checkpoint%input, used_values(input), input_errors)
   end subroutine load_checkpoint
 
@@ -352,10 +348,10 @@ contains
     type(checkpoint_t), intent(in) :: checkpoint
     type(body_t),       intent(in) :: body
 
-    same = size(checkpoint%volume) == size(body%points)
-    if (same) same = all(abs(checkpoint%position - body%position(body%points, :)) <= 0.0_wp) &
-      .and. all(abs(checkpoint%volume - body%volume(body%points)) <= 0.0_wp) &
-      .and. all(checkpoint%boundary == body%boundary(body%points))
+    same = size(checkpoint%volume) == body%n
+    if (same) same = all(abs(checkpoint%position - body%position) <= 0.0_wp) &
+      .and. all(abs(checkpoint%volume - body%volume) <= 0.0_wp) &
+      .and. all(checkpoint%boundary == body%boundary)
   end function same_points
 
 end module pd_record
