@@ -31,8 +31,6 @@ EXCEPTIONS = {
     "tests/support/funit.f90": "stands for pFUnit's module funit, which a suite uses whole",
     **dict.fromkeys(
         (
-            "postproc/perigeo_post/cli.py",
-            "postproc/perigeo_post/result.py",
             "postproc/tests/test_report.py",
             "src/app/perigeo.f90:perigeo",
             "src/input/pd_keys.f90",
