@@ -130,7 +130,7 @@ contains
 
     allocate (work%a(model%body%n, 4), source=0.0_wp)   ! voids stay zero
     if (checkpoint%history_rows > 0) then
-      state = state%scattered(model%body%points, model%body%n)
+      call state%scatter(model%body%points, model%body%n)
       call boundary_forces(model%body%position, model%body%volume, checkpoint%time, &
         state%force, model%boundaries)
     else

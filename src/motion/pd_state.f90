@@ -1,5 +1,9 @@
 !> The state of a run: everything that changes from step to step at the points.
+!>
+!> `visit` is the table of its fields: whatever is done with all of them is a visitor.
 module pd_state
+  use pd_fields, only: allocating_t, counting_t, field_visitor_t, gathering_t, scattering_t, &
+    state_field_t
   use pd_kinds, only: n_block, wp
   implicit none
   private
@@ -17,9 +21,11 @@ module pd_state
     real(wp), allocatable :: back_stress(:, :)           !! beta (n,4) xx yy zz xy [Pa]
     real(wp), allocatable :: alpha(:)                    !! equivalent plastic strain (n)
   contains
+    procedure :: visit
     procedure :: allocate => allocate_state
-    procedure :: gathered
-    procedure :: scattered
+    procedure :: gather
+    procedure :: scatter
+    procedure :: numbers_per_point
   end type state_t
 
   !> What the blocks of points hand back in a step. Added up in the order of the blocks, it has the
@@ -51,50 +57,66 @@ contains
     allocate (self%failed(n_blocks), source=0)
   end subroutine fit
 
+  !> Show all fields to a visitor.
+  subroutine visit(self, visitor)
+    class(state_t),         intent(inout) :: self
+    class(field_visitor_t), intent(inout) :: visitor
+    character(*), parameter :: tensor = 'xx yy zz xy'
+
+    call visitor%field(state_field_t('displacement', 'm', 'displacement u', 'x y', &
+      by_neighbours=.true.), self%displacement)
+    call visitor%field(state_field_t('velocity', 'm/s', 'velocity v', 'x y'), self%velocity)
+    call visitor%field(state_field_t('force', 'N/m^3', 'force density f, loads and control '// &
+      'included', 'x y'), self%force)
+    call visitor%field(state_field_t('deformation_gradient', '1', 'deformation gradient F', &
+      'xx xy yx yy', rest=[1.0_wp, 0.0_wp, 0.0_wp, 1.0_wp]), self%deformation_gradient)
+    call visitor%field(state_field_t('stress', 'Pa', 'second Piola-Kirchhoff stress S', tensor), &
+      self%stress)
+    call visitor%field(state_field_t('plastic_strain', '1', 'plastic strain E^p', tensor), &
+      self%plastic_strain)
+    call visitor%field(state_field_t('back_stress', 'Pa', 'back stress beta', tensor), &
+      self%back_stress)
+    call visitor%field(state_field_t('alpha', '1', 'equivalent plastic strain alpha'), self%alpha)
+  end subroutine visit
+
   !> The unloaded state of n points.
   subroutine allocate_state(self, n)
-    class(state_t), intent(out) :: self
-    integer,        intent(in)  :: n
+    class(state_t), intent(inout) :: self
+    integer,        intent(in)    :: n
+    type(allocating_t) :: room
 
-    allocate (self%displacement(n, 2), self%velocity(n, 2), self%force(n, 2), source=0.0_wp)
-    allocate (self%deformation_gradient(n, 4), source=0.0_wp)
-    self%deformation_gradient(:, [1, 4]) = 1.0_wp
-    allocate (self%stress(n, 4), self%plastic_strain(n, 4), self%back_stress(n, 4), source=0.0_wp)
-    allocate (self%alpha(n), source=0.0_wp)
+    room%n = n
+    call self%visit(room)
   end subroutine allocate_state
 
-  !> The state of some places only, in their order.
-  function gathered(self, places) result(state)
-    class(state_t), intent(in) :: self
-    integer,        intent(in) :: places(:)
-    type(state_t) :: state
+  !> Reduce the fields that a restart needs to some places, in their order, and give up the others.
+  subroutine gather(self, places)
+    class(state_t), intent(inout) :: self
+    integer,        intent(in)    :: places(:)
+    type(gathering_t) :: choice
 
-    allocate (state%displacement(size(places), 2), source=self%displacement(places, :))
-    allocate (state%velocity(size(places), 2), source=self%velocity(places, :))
-    allocate (state%force(size(places), 2), source=self%force(places, :))
-    allocate (state%deformation_gradient(size(places), 4), &
-      source=self%deformation_gradient(places, :))
-    allocate (state%stress(size(places), 4), source=self%stress(places, :))
-    allocate (state%plastic_strain(size(places), 4), source=self%plastic_strain(places, :))
-    allocate (state%back_stress(size(places), 4), source=self%back_stress(places, :))
-    allocate (state%alpha(size(places)), source=self%alpha(places))
-  end function gathered
+    choice%places = places
+    call self%visit(choice)
+  end subroutine gather
 
   !> The state of n places from that of some of them; the others are unloaded and at rest.
-  function scattered(self, places, n) result(state)
-    class(state_t), intent(in) :: self
-    integer,        intent(in) :: places(:), n
-    type(state_t) :: state
+  subroutine scatter(self, places, n)
+    class(state_t), intent(inout) :: self
+    integer,        intent(in)    :: places(:), n
+    type(scattering_t) :: spread_out
 
-    call state%allocate(n)
-    state%displacement(places, :) = self%displacement
-    state%velocity(places, :) = self%velocity
-    state%force(places, :) = self%force
-    state%deformation_gradient(places, :) = self%deformation_gradient
-    state%stress(places, :) = self%stress
-    state%plastic_strain(places, :) = self%plastic_strain
-    state%back_stress(places, :) = self%back_stress
-    state%alpha(places) = self%alpha
-  end function scattered
+    spread_out%places = places
+    spread_out%n = n
+    call self%visit(spread_out)
+  end subroutine scatter
+
+  !> Numbers per point in all fields.
+  integer function numbers_per_point(self) result(numbers)
+    class(state_t), intent(inout) :: self   !! visited, not changed
+    type(counting_t) :: count
+
+    call self%visit(count)
+    numbers = count%numbers
+  end function numbers_per_point
 
 end module pd_state

@@ -301,6 +301,7 @@ contains
     type(record_t),     intent(in)    :: record
     type(error_list_t), intent(inout) :: errors
     type(checkpoint_t) :: checkpoint
+    type(state_t)      :: kept
 
     checkpoint%step = step
     checkpoint%time_step = model%motion%time_step
@@ -315,8 +316,10 @@ contains
       checkpoint%position = body%position(places, :)
       checkpoint%volume = body%volume(places)
       checkpoint%boundary = body%boundary(places)
-      call write_checkpoint(record%stem, checkpoint, state%gathered(places), errors)
+      kept = state
+      call kept%gather(places)
     end associate
+    call write_checkpoint(record%stem, checkpoint, kept, errors)
   end subroutine save_checkpoint
 
   !> Read the newest checkpoint and compare its input with the present one. The state has the points
