@@ -10,11 +10,12 @@ program perigeo
   use pd_command_line, only: options_t, print_help, read_command_line
   use pd_errors, only: error_list_t, exit_calculation, exit_command_line, exit_file, exit_input, &
     exit_interrupted, exit_model, exit_ok, exit_terminated, stop_if_any
+  use pd_history_columns, only: history_columns
   use pd_input, only: read_input
   use pd_input_reference, only: write_input_reference
   use pd_input_types, only: input_t
   use pd_kinds, only: wp
-  use pd_observe, only: ledger_t, observation_t, observe, running_away
+  use pd_observe, only: column_t, ledger_t, moment_at, observation_t, observe, running_away
   use pd_progress, only: progress_due
   use pd_record, only: close_record, load_checkpoint, observe_state, open_record, record_failure, &
     record_frame, record_line, record_progress, record_row, record_t, results_in_the_way, &
@@ -87,6 +88,7 @@ contains
     character(:), allocatable :: warning
     type(error_list_t) :: input_errors
     type(summary_t)    :: summary
+    type(column_t), allocatable :: columns(:)
     type(observation_t) :: seen
     integer :: i
 
@@ -135,8 +137,9 @@ contains
         state%force, model%boundaries)
     else
       call start(model, state)
-      call observe(model%body, model%solid, model%operators, state, ledger, seen)
-      ledger%initial_kinetic_energy = seen%kinetic_energy
+      call history_columns(model, columns)
+      call observe(columns, model, state, moment_at(0, model, state, ledger), seen)
+      ledger%initial_kinetic_energy = seen%value('kinetic_energy')
     end if
   end subroutine set_up
 
@@ -188,10 +191,10 @@ contains
     do i = 1, warnings%count()
       call record_line(record, 'warning: '//warnings%message(i), errors)
     end do
-    call observe_state(model, state, ledger, record)
+    call observe_state(model, state, ledger, checkpoint%step, record)
     if (checkpoint%history_rows == 0) then
-      call record_row(model, state, 0, record, errors)
-      if (errors%count() == 0) call record_frame(model, state, 0, record, errors)
+      call record_row(record, errors)
+      if (errors%count() == 0) call record_frame(model, state, record, errors)
     else
       call record_line(record, 'going on from a checkpoint', errors)
     end if
@@ -221,21 +224,21 @@ contains
     integer :: k
 
     if (due%row .or. due%frame .or. due%checkpoint) then
-      call observe_state(model, state, ledger, record)
+      call observe_state(model, state, ledger, step, record)
       ! After the first step from rest loads have given half a kick, and no work has been done yet.
       if (step > 1 .and. running_away(record%seen, ledger)) then
         failed_point = fastest_point()
         call fail('the energy runs away')
       end if
     end if
-    if (due%row) call record_row(model, state, step, record, errors)
+    if (due%row) call record_row(record, errors)
     if (progress_due(record%progress, step, schedule%steps)) &
       call record_progress(model, state, schedule, step, record, errors)
     call timing%lap(7)
 
     if (due%frame) then
       do k = 1, size(schedule%frame_steps)
-        if (schedule%frame_steps(k) == step) call record_frame(model, state, step, record, errors)
+        if (schedule%frame_steps(k) == step) call record_frame(model, state, record, errors)
       end do
     end if
     if (due%checkpoint) then

@@ -11,7 +11,7 @@ module pd_strain
 
   public :: green_lagrange, first_piola, determinant, cauchy
   public :: green_lagrange_block, small_strain_block, force_state_block
-  public :: normal_components_block
+  public :: first_piola_block
 
 contains
 
@@ -91,23 +91,21 @@ contains
     pyy = fyx * sxy + fyy * syy
   end subroutine first_piola_in_plane
 
-  !> P_xx, P_yy and E_yy of points lo to hi.
-  pure subroutine normal_components_block(lo, hi, f, s, pxx, pyy, eyy)
+  !> P = F S of points lo to hi.
+  pure subroutine first_piola_block(lo, hi, f, s, p)
     integer,  intent(in) :: lo, hi
     real(wp), intent(in),    contiguous :: f(:, :)   !! F (n,4) xx xy yx yy
     real(wp), intent(in),    contiguous :: s(:, :)   !! S (n,4) xx yy zz xy [Pa]
-    real(wp), intent(inout), contiguous :: pxx(:), pyy(:), eyy(:)   !! row 1 is point lo
-    real(wp) :: pxy, pyx, exx, exy
-    integer  :: i, b
+    real(wp), intent(inout), contiguous :: p(:, :)   !! P xx xy yx yy [Pa]; row 1 is point lo
+    integer :: i, b
 
-    !$omp simd simdlen(8) private(b, pxy, pyx, exx, exy)
+    !$omp simd simdlen(8) private(b)
     do i = lo, hi
       b = i - lo + 1
       call first_piola_in_plane(f(i, 1), f(i, 2), f(i, 3), f(i, 4), s(i, 1), s(i, 2), s(i, 4), &
-        pxx(b), pxy, pyx, pyy(b))
-      call green_lagrange_in_plane(f(i, 1), f(i, 2), f(i, 3), f(i, 4), exx, eyy(b), exy)
+        p(b, 1), p(b, 2), p(b, 3), p(b, 4))
     end do
-  end subroutine normal_components_block
+  end subroutine first_piola_block
 
   !> A = P K^-1 of points lo to hi, P = F S.
   pure subroutine force_state_block(lo, hi, f, s, k, a)

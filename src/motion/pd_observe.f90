@@ -1,18 +1,26 @@
-!> What a run tells about itself: averages, energies and their balance, fields at the points.
+!> What a run tells about itself: one number per column of the history.
 !>
+!> A column says how its value comes about, and what it is called; which columns there are stands
+!> in `pd_history_columns`. The blocks of points are gone through once, all columns of a block
+!> while it is in the cache.
 !> Source: doc/theory.md, section 10.
 module pd_observe
+  use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
+  use pd_boundary, only: nominal_strain
   use pd_force, only: solid_t
   use pd_geometry, only: body_t
-  use pd_j2, only: elastic_energy_block, von_mises
-  use pd_kinds, only: block_dot, block_sum, n_block, wp
+  use pd_kinds, only: block_sum, n_block, wp
+  use pd_labels, only: label_t
+  use pd_model, only: model_t
   use pd_operators, only: operators_t
   use pd_state, only: state_t
-  use pd_strain, only: cauchy, determinant, green_lagrange, normal_components_block
+  use pd_strain, only: first_piola_block, green_lagrange_block
   implicit none
   private
 
-  public :: ledger_t, observation_t, observe, running_away, point_field
+  public :: ledger_t, moment_t, block_view_t, row_view_t, column_t, observation_t
+  public :: total, mean, largest, smallest
+  public :: moment_at, observe, surplus, running_away
 
   !> Energies that are added up step by step [J/m], and what the balance refers to.
   type :: ledger_t
@@ -25,18 +33,69 @@ module pd_observe
     procedure :: enter
   end type ledger_t
 
-  !> Numbers of one row of the history, boundary forces aside.
+  !> When a state is looked at.
+  type :: moment_t
+    integer  :: step = 0
+    real(wp) :: time = 0.0_wp                   !! [s]
+    real(wp) :: strain = 0.0_wp                 !! nominal; 0 without platens
+    type(ledger_t) :: ledger
+  end type moment_t
+
+  !> Points lo to hi as the columns see them; row 1 of the arrays is point lo. Rows behind the last
+  !> point are 0, for sums go over whole blocks.
+  type :: block_view_t
+    type(model_t), pointer :: model => null()
+    type(state_t), pointer :: state => null()
+    integer  :: lo = 1, hi = 0
+    real(wp) :: weight(n_block) = 0.0_wp        !! volume of a point of the body; fictitious: 0
+    real(wp) :: p(n_block, 4) = 0.0_wp          !! first Piola-Kirchhoff stress xx xy yx yy [Pa]
+    real(wp) :: strain(n_block, 4) = 0.0_wp     !! xx yy zz xy
+  end type block_view_t
+
+  !> How the parts of the blocks become the value of a column.
+  integer, parameter :: total = 1      !! added up
+  integer, parameter :: mean = 2       !! added up, over the volume of the body
+  integer, parameter :: largest = 3
+  integer, parameter :: smallest = 4
+
+  !> One row of the history.
   type :: observation_t
-    real(wp) :: mean_stress_xx = 0.0_wp, mean_stress_yy = 0.0_wp     !! of P [Pa]
-    real(wp) :: mean_strain_yy = 0.0_wp
-    real(wp) :: max_plastic_strain = 0.0_wp
-    real(wp) :: kinetic_energy = 0.0_wp, strain_energy = 0.0_wp      !! [J/m]
-    real(wp) :: plastic_dissipation = 0.0_wp, damping_dissipation = 0.0_wp
-    real(wp) :: stabilisation_energy = 0.0_wp, external_work = 0.0_wp
-    real(wp) :: energy_error = 0.0_wp
+    character(80), allocatable :: names(:)
+    real(wp),      allocatable :: values(:)
+  contains
+    procedure :: value => value_by_name
   end type observation_t
 
-  integer, parameter :: n_sums = 6
+  !> What a column sees that needs no look at the points.
+  type :: row_view_t
+    type(model_t), pointer :: model => null()
+    type(moment_t) :: moment
+    type(observation_t) :: seen                 !! columns from blocks, and those before this one
+    real(wp) :: control_energy = 0.0_wp         !! [J/m]
+    integer  :: boundary = 0, component = 0     !! that the column is about
+  end type row_view_t
+
+  !> A column of the history: its value comes from the blocks or from elsewhere.
+  type, extends(label_t) :: column_t
+    logical :: whole_number = .false.
+    integer :: joined = 0                       !! how, where there are parts of blocks
+    procedure(part_of_block), pointer, nopass :: part => null()
+    procedure(value_of_row), pointer, nopass :: value => null()
+    integer :: boundary = 0, component = 0      !! that it is about, if it is
+  end type column_t
+
+  abstract interface
+    !> What a block of points gives to a column.
+    pure real(wp) function part_of_block(block)
+      import :: block_view_t, wp
+      type(block_view_t), intent(in) :: block
+    end function part_of_block
+    !> A value that comes from elsewhere.
+    pure real(wp) function value_of_row(row)
+      import :: row_view_t, wp
+      type(row_view_t), intent(in) :: row
+    end function value_of_row
+  end interface
 
 contains
 
@@ -53,108 +112,114 @@ contains
     self%largest_work = max(self%largest_work, abs(self%external_work))
   end subroutine enter
 
-  !> Averages over the body without fictitious points, energies over all points.
-  subroutine observe(body, solid, operators, state, ledger, seen)
-    type(body_t),        intent(in)  :: body
-    type(solid_t),       intent(in)  :: solid
-    class(operators_t),  intent(inout) :: operators   !! their work space alone
-    type(state_t),       intent(in)  :: state
-    type(ledger_t),      intent(in)  :: ledger
-    type(observation_t), intent(out) :: seen
-    real(wp), allocatable :: sums_of(:, :), largest_of(:)
-    real(wp) :: sums(n_sums)
-    integer  :: block, n_blocks
+  !> The moment after a step.
+  pure type(moment_t) function moment_at(step, model, state, ledger) result(moment)
+    integer,        intent(in) :: step
+    type(model_t),  intent(in) :: model
+    type(state_t),  intent(in) :: state
+    type(ledger_t), intent(in) :: ledger
 
-    n_blocks = (body%n + n_block - 1) / n_block
-    allocate (sums_of(n_sums, n_blocks), largest_of(n_blocks))
-    !$omp parallel do schedule(static) default(none) private(block) &
-    !$omp shared(n_blocks, body, solid, state, sums_of, largest_of)
-    do block = 1, n_blocks
-      call sum_block((block - 1) * n_block + 1, min(block * n_block, body%n), body, solid, &
-        state, sums_of(:, block), largest_of(block))
+    moment%step = step
+    moment%time = real(step, wp) * model%motion%time_step
+    if (model%platens%axis > 0) moment%strain = nominal_strain(model%platens, model%boundaries, &
+      moment%time, state%displacement)
+    moment%ledger = ledger
+  end function moment_at
+
+  !> The values of all columns.
+  subroutine observe(columns, model, state, moment, seen)
+    type(column_t),        intent(in)    :: columns(:)
+    type(model_t), target, intent(inout) :: model    !! work space of its operators
+    type(state_t),         intent(in)    :: state
+    type(moment_t),        intent(in)    :: moment
+    type(observation_t),   intent(out)   :: seen
+    type(row_view_t) :: row
+    integer :: k
+
+    row%model => model
+    row%moment = moment
+    call control_energy(model%body, model%solid, model%operators, state, row%control_energy)
+    allocate (row%seen%names(size(columns)), source=columns%name)
+    allocate (row%seen%values(size(columns)), source=ieee_value(1.0_wp, ieee_quiet_nan))
+    call observe_blocks(columns, model, state, row%seen%values)
+    do k = 1, size(columns)
+      if (.not. associated(columns(k)%value)) cycle
+      row%boundary = columns(k)%boundary
+      row%component = columns(k)%component
+      row%seen%values(k) = columns(k)%value(row)
     end do
-    !$omp end parallel do
-    sums = sum(sums_of, dim=2)
-
-    seen%max_plastic_strain = maxval(largest_of)
-    seen%mean_stress_xx = sums(2) / sums(1)
-    seen%mean_stress_yy = sums(3) / sums(1)
-    seen%mean_strain_yy = sums(4) / sums(1)
-    seen%strain_energy = sums(5)
-    seen%kinetic_energy = sums(6)
-    call control_energy(body, solid, operators, state, seen%stabilisation_energy)
-    seen%plastic_dissipation = ledger%plastic_dissipation
-    seen%damping_dissipation = ledger%damping_dissipation
-    seen%external_work = ledger%external_work
-    seen%energy_error = surplus(seen, ledger)
-    if (abs(seen%energy_error) > 0.0_wp) seen%energy_error = seen%energy_error &
-      / max(abs(ledger%external_work), ledger%initial_kinetic_energy, abs(seen%energy_error))
+    seen = row%seen
   end subroutine observe
 
-  !> Sums over points lo to hi: volume, V P_xx, V P_yy, V E_yy (body), strain and kinetic energy
-  !> (all points); and the largest equivalent plastic strain of the body.
-  pure subroutine sum_block(lo, hi, body, solid, state, sums, largest)
-    integer,       intent(in)  :: lo, hi
-    type(body_t),  intent(in)  :: body
-    type(solid_t), intent(in)  :: solid
-    type(state_t), intent(in)  :: state
-    real(wp),      intent(out) :: sums(n_sums), largest
-    real(wp) :: weight(n_block), pxx(n_block), pyy(n_block), eyy(n_block), energy(n_block)
-    real(wp) :: kinetic(n_block)
-    integer  :: n
+  !> The values of those columns that come from blocks.
+  subroutine observe_blocks(columns, model, state, values)
+    type(column_t), intent(in)    :: columns(:)
+    type(model_t), target, intent(in) :: model
+    type(state_t), target, intent(in) :: state
+    real(wp),       intent(inout) :: values(:)
+    real(wp), allocatable :: parts(:, :), weights(:)
+    integer :: block, n_blocks, k
 
-    n = hi - lo + 1
-    if (n < n_block) then   ! sums go over whole blocks
-      weight = 0.0_wp
-      pxx = 0.0_wp
-      pyy = 0.0_wp
-      eyy = 0.0_wp
-      energy = 0.0_wp
-      kinetic = 0.0_wp
-    end if
-    call normal_components_block(lo, hi, state%deformation_gradient, state%stress, pxx, pyy, eyy)
-    call elastic_energy_block(solid%material, lo, hi, state%stress, energy)
-    call weigh_block(lo, hi, body%boundary, body%volume, state%velocity, weight, energy, kinetic)
-    largest = largest_of_block(lo, hi, body%boundary, state%alpha)
-    sums(1) = block_sum(weight)
-    sums(2) = block_dot(weight, pxx)
-    sums(3) = block_dot(weight, pyy)
-    sums(4) = block_dot(weight, eyy)
-    sums(5) = block_sum(energy)
-    sums(6) = 0.5_wp * solid%density * block_sum(kinetic)
-  end subroutine sum_block
+    n_blocks = (model%body%n + n_block - 1) / n_block
+    allocate (parts(size(columns), n_blocks), weights(n_blocks))
+    !$omp parallel do schedule(static) default(none) private(block) &
+    !$omp shared(n_blocks, columns, model, state, parts, weights)
+    do block = 1, n_blocks
+      call look_at_block(block, columns, model, state, parts(:, block), weights(block))
+    end do
+    !$omp end parallel do
+    do k = 1, size(columns)
+      if (.not. associated(columns(k)%part)) cycle
+      select case (columns(k)%joined)
+      case (total)
+        values(k) = sum(parts(k, :))
+      case (mean)
+        values(k) = sum(parts(k, :)) / sum(weights)
+      case (largest)
+        values(k) = maxval(parts(k, :))
+      case (smallest)
+        values(k) = minval(parts(k, :))
+      end select
+    end do
+  end subroutine observe_blocks
 
-  !> Weights of points lo to hi in averages over the body, and their energies times volumes; without
-  !> a branch.
-  pure subroutine weigh_block(lo, hi, boundary, volume, v, weight, energy, kinetic)
-    integer,  intent(in) :: lo, hi
-    integer,  intent(in), contiguous :: boundary(:)       !! 0: the body
-    real(wp), intent(in), contiguous :: volume(:), v(:, :)
-    real(wp), intent(inout) :: weight(n_block), energy(n_block), kinetic(n_block)
+  !> What one block gives to the columns, and the volume of its points of the body.
+  subroutine look_at_block(number, columns, model, state, parts, weight)
+    integer,        intent(in)  :: number
+    type(column_t), intent(in)  :: columns(:)
+    type(model_t), target, intent(in) :: model
+    type(state_t), target, intent(in) :: state
+    real(wp),       intent(out) :: parts(:), weight
+    type(block_view_t) :: block
+    integer :: k
+
+    block%model => model
+    block%state => state
+    block%lo = (number - 1) * n_block + 1
+    block%hi = min(number * n_block, model%body%n)
+    call fill_view(model%body, state, block)
+    weight = block_sum(block%weight)
+    parts = 0.0_wp
+    do k = 1, size(columns)
+      if (associated(columns(k)%part)) parts(k) = columns(k)%part(block)
+    end do
+  end subroutine look_at_block
+
+  !> Weights, stress and strain of a block; without a branch.
+  pure subroutine fill_view(body, state, block)
+    type(body_t),       intent(in)    :: body
+    type(state_t),      intent(in)    :: state
+    type(block_view_t), intent(inout) :: block
     integer :: i, b
 
     !$omp simd simdlen(8) private(b)
-    do i = lo, hi
-      b = i - lo + 1
-      weight(b) = real(1 - min(1, abs(boundary(i))), wp) * volume(i)
-      energy(b) = volume(i) * energy(b)
-      kinetic(b) = volume(i) * (v(i, 1)**2 + v(i, 2)**2)
+    do i = block%lo, block%hi
+      b = i - block%lo + 1
+      block%weight(b) = real(1 - min(1, abs(body%boundary(i))), wp) * body%volume(i)
     end do
-  end subroutine weigh_block
-
-  !> Largest alpha of the body among points lo to hi.
-  pure real(wp) function largest_of_block(lo, hi, boundary, alpha) result(largest)
-    integer,  intent(in) :: lo, hi
-    integer,  intent(in), contiguous :: boundary(:)       !! 0: the body
-    real(wp), intent(in), contiguous :: alpha(:)
-    integer :: i
-
-    largest = 0.0_wp
-    !$omp simd simdlen(8) reduction(max:largest)
-    do i = lo, hi
-      largest = max(largest, real(1 - min(1, abs(boundary(i))), wp) * alpha(i))
-    end do
-  end function largest_of_block
+    call green_lagrange_block(block%lo, block%hi, state%deformation_gradient, block%strain)
+    call first_piola_block(block%lo, block%hi, state%deformation_gradient, state%stress, block%p)
+  end subroutine fill_view
 
   !> Energy of the control: with constant c it has a potential, (1/2) sum V c sum omega V_j |z|^2,
   !> which is the work of the control forces without the error of adding it up. The force is linear
@@ -219,14 +284,26 @@ contains
     energy = block_sum(terms)
   end function control_energy_of_block
 
+  !> The value of a column; not a number where there is none of this name.
+  pure real(wp) function value_by_name(self, name) result(value)
+    class(observation_t), intent(in) :: self
+    character(*),         intent(in) :: name
+    integer :: k
+
+    value = ieee_value(1.0_wp, ieee_quiet_nan)
+    do k = 1, size(self%names)
+      if (self%names(k) == name) value = self%values(k)
+    end do
+  end function value_by_name
+
   !> Energy that came from nowhere [J/m].
   pure real(wp) function surplus(seen, ledger)
     type(observation_t), intent(in) :: seen
     type(ledger_t),      intent(in) :: ledger
 
-    surplus = seen%kinetic_energy + seen%strain_energy + seen%plastic_dissipation &
-      + seen%damping_dissipation + seen%stabilisation_energy - ledger%initial_kinetic_energy &
-      - ledger%external_work
+    surplus = seen%value('kinetic_energy') + seen%value('strain_energy') &
+      + seen%value('plastic_dissipation') + seen%value('damping_dissipation') &
+      + seen%value('stabilisation_energy') - ledger%initial_kinetic_energy - ledger%external_work
   end function surplus
 
   !> Whether the run has gained as much energy from nowhere as was ever put into it. Not a number
@@ -238,91 +315,5 @@ contains
     running_away = .not. surplus(seen, ledger) <= max(ledger%largest_work, &
       ledger%initial_kinetic_energy) + tiny(1.0_wp)
   end function running_away
-
-  !> A field of a frame, for the points without voids: displacement, velocity, Cauchy stress,
-  !> strain, plastic_strain, von_mises, or zero_energy: the rms of the zero-energy part of the
-  !> deformation, weighted with omega V over the family, over the horizon. A point that has failed
-  !> (det F <= 0) has no Cauchy stress: 0.
-  subroutine point_field(name, body, operators, state, delta, values)
-    character(*),       intent(in)  :: name
-    type(body_t),       intent(in)  :: body
-    class(operators_t), intent(in)  :: operators
-    type(state_t),      intent(in)  :: state
-    real(wp),           intent(in)  :: delta                       !! horizon [m]
-    real(wp),           intent(out), contiguous :: values(:, :)    !! (components,points)
-    real(wp), allocatable :: z2(:)
-
-    select case (name)
-    case ('displacement')
-      call take(state%displacement)
-    case ('velocity')
-      call take(state%velocity)
-    case ('stress', 'von_mises')
-      call take_stress(name == 'von_mises')
-    case ('strain')
-      call take_strain()
-    case ('plastic_strain')
-      values(1, :) = state%alpha(body%points)
-    case default   ! zero_energy
-      allocate (z2(body%n))
-      call operators%zero_energy_squared(state%displacement, state%deformation_gradient, z2)
-      values(1, :) = sqrt(z2(body%points) / operators%weight_sum(body%points)) / delta
-    end select
-
-  contains
-
-    subroutine take(field)
-      real(wp), intent(in) :: field(:, :)   !! (n,components)
-      integer :: i
-
-      !$omp parallel do schedule(static) default(none) private(i) shared(body, values, field)
-      do i = 1, size(body%points)
-        values(:, i) = field(body%points(i), :)
-      end do
-      !$omp end parallel do
-    end subroutine take
-
-    subroutine take_stress(as_mises)
-      logical, intent(in) :: as_mises
-      real(wp) :: f(4), s(4), stress(4)
-      integer  :: i
-
-      !$omp parallel do schedule(static) default(none) private(i, f, s, stress) &
-      !$omp shared(body, values, state, as_mises)
-      do i = 1, size(body%points)
-        f = state%deformation_gradient(body%points(i), :)
-        s = state%stress(body%points(i), :)
-        stress = cauchy_or_zero(f, s)
-        if (as_mises) then
-          values(1, i) = von_mises(stress)
-        else
-          values(:, i) = stress
-        end if
-      end do
-      !$omp end parallel do
-    end subroutine take_stress
-
-    subroutine take_strain()
-      real(wp) :: f(4)
-      integer  :: i
-
-      !$omp parallel do schedule(static) default(none) private(i, f) shared(body, values, state)
-      do i = 1, size(body%points)
-        f = state%deformation_gradient(body%points(i), :)
-        values(:, i) = green_lagrange(f)
-      end do
-      !$omp end parallel do
-    end subroutine take_strain
-
-  end subroutine point_field
-
-  !> Cauchy stress; 0 where det F is not positive.
-  pure function cauchy_or_zero(f, s) result(stress)
-    real(wp), intent(in) :: f(4), s(4)   !! F xx xy yx yy; S xx yy zz xy [Pa]
-    real(wp) :: stress(4)                !! xx yy zz xy [Pa]
-
-    stress = 0.0_wp
-    if (determinant(f) > 0.0_wp) stress = cauchy(f, s)
-  end function cauchy_or_zero
 
 end module pd_observe
