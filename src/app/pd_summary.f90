@@ -97,7 +97,7 @@ contains
     integer :: weaker
 
     if (.not. is_set(field%coefficient_of_variation)) return
-    associate (strength => model%strength, &
+    associate (strength => model%strength(model%operators%storage%row), &
       inside => model%body%boundary == 0)
       spread = spread_of(strength, model%body%volume, inside)
       weaker = 0
