@@ -8,6 +8,7 @@ module pd_summary
   use pd_random_field, only: spread_of, spread_t
   use pd_schedule, only: schedule_t
   use pd_model, only: model_t
+  use pd_state, only: state_t
   implicit none
   private
 
@@ -96,7 +97,7 @@ contains
     integer :: weaker
 
     if (.not. is_set(field%coefficient_of_variation)) return
-    associate (strength => model%strength, &
+    associate (strength => model%strength(model%operators%storage%row), &
       inside => model%body%boundary == 0)
       spread = spread_of(strength, model%body%volume, inside)
       weaker = 0
@@ -153,12 +154,14 @@ contains
 
   end subroutine add_loads
 
-  !> Memory of a run [bytes]: bonds, fields of the state (23 numbers a point), what is fixed (10),
+  !> Memory of a run [bytes]: bonds; per point the fields of the state, what is fixed (10 numbers),
   !> work space (4), a field of a frame on its way to the disk (5).
-  pure real(wp) function memory(model)
+  real(wp) function memory(model)
     type(model_t), intent(in) :: model
+    type(state_t) :: state
 
-    memory = model%operators%memory() + real(model%operators%n, wp) * 8.0_wp * (23 + 10 + 4 + 5)
+    memory = model%operators%memory() &
+      + real(model%operators%n, wp) * 8.0_wp * real(state%numbers_per_point() + 10 + 4 + 5, wp)
   end function memory
 
   !> Wall clock time of the run [s], from the fastest of a few applications of the linear operator
