@@ -14,9 +14,6 @@ generated=pd_version
 # Who may mention voids and shares: folders (with a slash) and files, relative to SRC.
 may_know_voids="operators/"
 
-# Upward uses that there are, as USER>USED. An entry without such a use is an error.
-upward_today="pd_errors>pd_system"
-
 check() {
   src=$1
   unit=$2
@@ -32,15 +29,13 @@ check() {
   # The names of files are names of modules, without blanks; awk takes no text of several lines.
   # shellcheck disable=SC2086
   awk -v src="$src" -v unit="$unit" -v list="$*" -v folders="$(printf '%s ' $folders)" \
-    -v suites="$(printf '%s ' $suites)" -v generated="$generated" -v may_know="$may_know_voids" \
-    -v upward_today="$upward_today" '
+    -v suites="$(printf '%s ' $suites)" -v generated="$generated" -v may_know="$may_know_voids" '
     BEGIN {
       count = split(list, names, " ")
       for (i = 1; i <= count; i++) layer[names[i]] = i
       check_folders()
       for (i = 1; i < ARGC; i++) enter(ARGV[i])
       check_suites()
-      set_of(upward_today, upward)
     }
 
     FNR == 1 { user = stem(FILENAME); defined = 0 }
@@ -70,18 +65,13 @@ check() {
       } else if (home[used] == home[user]) {
         if (!((user, used) in edge)) uses[user] = uses[user] " " used
         edge[user, used] = FILENAME ":" FNR
-      } else if (layer[home[used]] > layer[home[user]]) {
-        if ((user ">" used) in upward) upward[user ">" used] = 2
-        else complain(FILENAME ":" FNR, user " (" home[user] ") uses " used " (" home[used] \
+      } else if (layer[home[used]] > layer[home[user]])
+        complain(FILENAME ":" FNR, user " (" home[user] ") uses " used " (" home[used] \
           "), which is not in a layer below it")
-      }
     }
 
     END {
       for (i = 1; i <= n_modules; i++) visit(modules[i])
-      for (use in upward)
-        if (upward[use] == 1)
-          complain("tools/check_layers.sh", use " is gone: take it out of upward_today")
       exit bad
     }
 
@@ -160,11 +150,6 @@ check() {
       return 0
     }
 
-    function set_of(text, set,    all, n, i) {
-      n = split(text, all, " ")
-      for (i = 1; i <= n; i++) set[all[i]] = 1
-    }
-
     function stem(path) { sub(/.*\//, "", path); sub(/\.f90$/, "", path); return path }
     function complain(place, text) { print place ": " text; bad = 1 }
   ' $sources
@@ -173,7 +158,6 @@ check() {
 self_test() {
   folder=$(mktemp -d "${TMPDIR:-/tmp}/perigeo-layers.XXXXXX") || exit 1
   trap 'rm -rf "$folder"' EXIT
-  upward_today=
   src=$folder/src
   unit=$folder/unit
 
@@ -217,11 +201,6 @@ self_test() {
   expect wrong 'pd_a (low) uses pd_d (high)' 'an upward use'
   write low/pd_a.f90 'USE :: PD_D'
   expect wrong 'pd_a (low) uses pd_d (high)' 'an upward use in another spelling'
-  upward_today='pd_a>pd_d'
-  expect clean '' 'an upward use that is known'
-  sound
-  expect wrong 'pd_a>pd_d is gone' 'a known upward use that is gone'
-  upward_today=
   write low/pd_a.f90 'use pd_nowhere, only: x'
   expect wrong 'uses pd_nowhere' 'an unknown module'
   write low/pd_a.f90 'use pd_b, only: x'

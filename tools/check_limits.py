@@ -32,11 +32,9 @@ EXCEPTIONS = {
     **dict.fromkeys(
         (
             "postproc/tests/test_report.py",
-            "src/app/perigeo.f90:perigeo",
             "src/input/pd_keys.f90",
             "src/input/pd_namelist.f90",
             "src/material/pd_j2.f90",
-            "src/output/pd_hdf5.f90",
             "tests/cases/test_study.py",
             "tests/verify/verify.py",
         ),

@@ -44,10 +44,11 @@ ALIGNMENT = "Arrays at whole lines of the cache"
 IN_CONTROL = {"&imperfection": CONTROL + "&imperfection"}
 
 # What a kernel must move and compute for an elastic point of a lattice [bytes, flops]; every array
-# once. Gradient and stress run in one loop and hand G over in the cache, divergence and control
-# f; motion is one pass from step to step. Rows and columns of the sums come on top.
-BYTES = {"motion": 112, "gradient": 32, "stress": 200, "divergence": 64, "control": 48}
-FLOPS = {"motion": 44, "gradient": 8, "stress": 110, "divergence": 6, "control": 10}
+# once. Gradient and stress run in one loop and hand H over in the cache, the sums of the force f;
+# motion is one pass from step to step. Rows and columns of the sums come on top.
+WITH_CONTROL = "force with control"
+BYTES = {"motion": 112, "gradient": 32, "stress": 200, "force": 64, WITH_CONTROL: 112}
+FLOPS = {"motion": 44, "gradient": 8, "stress": 110, "force": 6, WITH_CONTROL: 16}
 
 
 def flops_of_sums(kernel: str, m: int) -> int:
@@ -56,7 +57,7 @@ def flops_of_sums(kernel: str, m: int) -> int:
     Gradient and divergence each have two x sums of m - 1 rows and m columns, and two y sums of m
     rows and m columns; control has four sums of m + 1 rows and m columns.
     """
-    count = {"gradient": 8 * m - 2, "divergence": 8 * m - 2, "control": 8 * m + 4}
+    count = {"gradient": 8 * m - 2, "force": 8 * m - 2, WITH_CONTROL: 16 * m + 2}
     return 3 * count.get(kernel, 0)
 
 
@@ -91,11 +92,13 @@ def share_row(label: str, found: dict[str, float]) -> list[str]:
     return [label, f"{step_ns(found):.1f}", f"{bond_rate(found):.0f}", *shares]
 
 
-def roofline(found: dict[str, float], limits: dict[str, float], m: int) -> list[list[str]]:
-    """Each kernel against what memory and arithmetic of one core allow."""
-    rows = []
+def roofline(runs: dict[str, dict[str, float]], limits: dict[str, float]) -> list[list[str]]:
+    """Each kernel of (b) against what memory and arithmetic of one core allow."""
+    rows, m = [], 4
     for kernel in BYTES:
-        measured = 1e9 * found[kernel] / found["steps"] / found["points"]
+        found = runs["b_control" if kernel == WITH_CONTROL else "b_lattice"]
+        seconds = found["force" if kernel == WITH_CONTROL else kernel]
+        measured = 1e9 * seconds / found["steps"] / found["points"]
         memory = BYTES[kernel] / limits["triad_1"]
         arithmetic = (FLOPS[kernel] + flops_of_sums(kernel, m)) / limits["flops_1"]
         bound = max(memory, arithmetic)
@@ -271,12 +274,10 @@ def measure(quick: bool) -> tuple[dict[str, object], list[tuple[str, str]]]:
     data: dict[str, object] = {"machine": limits, "processor": processor(), **runs}
     wanted = [*rows_of_ratios(runs, cores), *rows_of_times(runs), *rows_of_size(data, cores)]
     head = ["kernel", "measured ns", "memory allows", "arithmetic allows", "of the bound"]
-    bounds = roofline(runs["b_lattice"], limits, 4)[:-1]
-    bounds += roofline(runs["b_control"], limits, 4)[-1:]
     tables = [
         ("One thread: a whole step, and where its time goes", table_of_cases(runs)),
         ("What is wanted, and what is found", table(["figure", "wanted", "found"], wanted)),
-        ("Roofline of (b), one thread, per point-step", table(head, bounds)),
+        ("Roofline of (b), one thread, per point-step", table(head, roofline(runs, limits))),
         ("Cost against m, 51 x 101", table_of_m(data, few, turns)),
         ("Cost against n, m = 4", table_of_n(data, few)),
         (ALIGNMENT, table_of_alignment(data, few)),

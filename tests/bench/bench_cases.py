@@ -26,8 +26,7 @@ KERNELS = (
     "motion",
     "gradient",
     "stress",
-    "divergence",
-    "control",
+    "force",
     "boundaries",
     "history",
     "frames",
@@ -196,8 +195,8 @@ def step_ns(found: dict[str, float]) -> float:
 
 
 def bond_rate(found: dict[str, float]) -> float:
-    """Millions of directed bonds per second and core, gradient and divergence together once."""
-    seconds = (found["gradient"] + found["divergence"]) * found["threads"]
+    """Millions of directed bonds per second and core, gradient and force together once."""
+    seconds = (found["gradient"] + found["force"]) * found["threads"]
     return 1e-6 * found["bonds"] * found["steps"] / seconds
 
 
