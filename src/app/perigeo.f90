@@ -15,13 +15,13 @@ program perigeo
   use pd_input_reference, only: write_input_reference
   use pd_input_types, only: input_t
   use pd_kinds, only: wp
+  use pd_model, only: find_highest_frequency, model_t, start
   use pd_observe, only: column_t, ledger_t, moment_at, observation_t, observe, running_away
   use pd_progress, only: progress_due
   use pd_record, only: close_record, load_checkpoint, observe_state, open_record, record_failure, &
     record_frame, record_line, record_progress, record_row, record_t, results_in_the_way, &
     same_points, save_checkpoint
   use pd_schedule, only: row_due, schedule_t
-  use pd_model, only: find_highest_frequency, model_t, start
   use pd_setup, only: set_up_body, set_up_model, set_up_schedule
   use pd_state, only: state_t
   use pd_step, only: step_work_t, take_step

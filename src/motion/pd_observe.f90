@@ -179,6 +179,8 @@ contains
         values(k) = maxval(parts(k, :))
       case (smallest)
         values(k) = minval(parts(k, :))
+      case default   ! no way to join them
+        values(k) = ieee_value(1.0_wp, ieee_quiet_nan)
       end select
     end do
   end subroutine observe_blocks

@@ -142,9 +142,10 @@ contains
     real(wp), allocatable :: z2(:)
 
     allocate (z2(view%model%body%n))
-    call view%model%operators%zero_energy_squared(view%state%displacement, view%state%deformation_gradient, z2)
-    associate (places => view%model%body%points)
-      values(1, :) = sqrt(z2(places) / view%model%operators%weight_sum(places)) / view%model%delta
+    associate (places => view%model%body%points, operators => view%model%operators)
+      call operators%zero_energy_squared(view%state%displacement, &
+        view%state%deformation_gradient, z2)
+      values(1, :) = sqrt(z2(places) / operators%weight_sum(places)) / view%model%delta
     end associate
   end subroutine zero_energy
 
