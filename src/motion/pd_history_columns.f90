@@ -100,43 +100,62 @@ contains
 
   pure real(wp) function plastic_strain(block) result(part)
     type(block_view_t), intent(in) :: block
+
+    part = largest_of_body(block%lo, block%hi, block%model%body%boundary, block%state%alpha)
+  end function plastic_strain
+
+  !> Largest value of the body among points lo to hi, or 0; without a branch.
+  pure real(wp) function largest_of_body(lo, hi, boundary, values) result(found)
+    integer,  intent(in) :: lo, hi
+    integer,  intent(in), contiguous :: boundary(:)   !! 0: the body
+    real(wp), intent(in), contiguous :: values(:)
     integer :: i
 
-    part = 0.0_wp
-    associate (alpha => block%state%alpha, boundary => block%model%body%boundary)
-      !$omp simd simdlen(8) reduction(max:part)
-      do i = block%lo, block%hi
-        part = max(part, real(1 - min(1, abs(boundary(i))), wp) * alpha(i))
-      end do
-    end associate
-  end function plastic_strain
+    found = 0.0_wp
+    !$omp simd simdlen(8) reduction(max:found)
+    do i = lo, hi
+      found = max(found, real(1 - min(1, abs(boundary(i))), wp) * values(i))
+    end do
+  end function largest_of_body
 
   pure real(wp) function kinetic_energy(block) result(part)
     type(block_view_t), intent(in) :: block
     real(wp) :: terms(n_block)
-    integer  :: i, b
 
-    terms = 0.0_wp
-    associate (v => block%state%velocity, volume => block%model%body%volume)
-      !$omp simd simdlen(8) private(b)
-      do i = block%lo, block%hi
-        b = i - block%lo + 1
-        terms(b) = volume(i) * (v(i, 1)**2 + v(i, 2)**2)
-      end do
-    end associate
+    if (block%hi - block%lo + 1 < n_block) terms = 0.0_wp
+    call square(block%lo, block%hi, block%model%body%volume, block%state%velocity, terms)
     part = 0.5_wp * block%model%solid%density * block_sum(terms)
   end function kinetic_energy
+
+  !> V |v|^2 of points lo to hi.
+  pure subroutine square(lo, hi, volume, v, terms)
+    integer,  intent(in) :: lo, hi
+    real(wp), intent(in), contiguous :: volume(:), v(:, :)
+    real(wp), intent(inout) :: terms(n_block)
+    integer :: i, b
+
+    !$omp simd simdlen(8) private(b)
+    do i = lo, hi
+      b = i - lo + 1
+      terms(b) = volume(i) * (v(i, 1)**2 + v(i, 2)**2)
+    end do
+  end subroutine square
 
   pure real(wp) function strain_energy(block) result(part)
     type(block_view_t), intent(in) :: block
     real(wp) :: terms(n_block)
-    integer  :: n
+    integer  :: i, b
 
-    n = block%hi - block%lo + 1
-    terms = 0.0_wp
+    if (block%hi - block%lo + 1 < n_block) terms = 0.0_wp
     call elastic_energy_block(block%model%solid%material, block%lo, block%hi, &
       block%state%stress, terms)
-    terms(:n) = block%model%body%volume(block%lo:block%hi) * terms(:n)
+    associate (volume => block%model%body%volume)
+      !$omp simd simdlen(8) private(b)
+      do i = block%lo, block%hi
+        b = i - block%lo + 1
+        terms(b) = volume(i) * terms(b)
+      end do
+    end associate
     part = block_sum(terms)
   end function strain_energy
 

@@ -47,9 +47,9 @@ module pd_observe
     type(model_t), pointer :: model => null()
     type(state_t), pointer :: state => null()
     integer  :: lo = 1, hi = 0
-    real(wp) :: weight(n_block) = 0.0_wp        !! volume of a point of the body; fictitious: 0
-    real(wp) :: p(n_block, 4) = 0.0_wp          !! first Piola-Kirchhoff stress xx xy yx yy [Pa]
-    real(wp) :: strain(n_block, 4) = 0.0_wp     !! xx yy zz xy
+    real(wp) :: weight(n_block)                 !! volume of a point of the body; fictitious: 0
+    real(wp) :: p(n_block, 4)                   !! first Piola-Kirchhoff stress xx xy yx yy [Pa]
+    real(wp) :: strain(n_block, 4)              !! xx yy zz xy
   end type block_view_t
 
   !> How the parts of the blocks become the value of a column.
@@ -214,6 +214,11 @@ contains
     type(block_view_t), intent(inout) :: block
     integer :: i, b
 
+    if (block%hi - block%lo + 1 < n_block) then
+      block%weight = 0.0_wp
+      block%p = 0.0_wp
+      block%strain = 0.0_wp
+    end if
     !$omp simd simdlen(8) private(b)
     do i = block%lo, block%hi
       b = i - block%lo + 1
