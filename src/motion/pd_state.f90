@@ -95,7 +95,7 @@ contains
     integer,        intent(in)    :: places(:)
     type(gathering_t) :: choice
 
-    choice%places = places
+    allocate (choice%places, source=places)
     call self%visit(choice)
   end subroutine gather
 
@@ -105,7 +105,7 @@ contains
     integer,        intent(in)    :: places(:), n
     type(scattering_t) :: spread_out
 
-    spread_out%places = places
+    allocate (spread_out%places, source=places)
     spread_out%n = n
     call self%visit(spread_out)
   end subroutine scatter

@@ -100,39 +100,57 @@ contains
   pure real(wp) function plastic_strain(block) result(part)
     type(block_view_t), intent(in) :: block
     real(wp) :: alpha(n_block)
+    integer  :: i
 
-    alpha = 0.0_wp
     call block%model%materials%plastic_strain_block(block%number, block%state%law_points_t, alpha)
-    part = maxval(block%model%points%in_body(block%lo:block%hi) * alpha(:block%hi - block%lo + 1))
+    part = 0.0_wp
+    associate (in_body => block%model%points%in_body, lo => block%lo)
+      !$omp simd simdlen(8) reduction(max:part)
+      do i = lo, block%hi
+        part = max(part, in_body(i) * alpha(i - lo + 1))
+      end do
+    end associate
   end function plastic_strain
 
   pure real(wp) function kinetic_energy(block) result(part)
     type(block_view_t), intent(in) :: block
     real(wp) :: terms(n_block), density(n_block)
-    integer  :: i, b
 
-    terms = 0.0_wp
+    if (block%hi - block%lo + 1 < n_block) terms = 0.0_wp
     density = 0.0_wp
     call block%model%materials%density_block(block%number, density)
-    associate (v => block%state%velocity, volume => block%model%points%volume)
-      !$omp simd simdlen(8) private(b)
-      do i = block%lo, block%hi
-        b = i - block%lo + 1
-        terms(b) = volume(i) * (v(i, 1)**2 + v(i, 2)**2)
-      end do
-    end associate
+    call square(block%lo, block%hi, block%model%points%volume, block%state%velocity, terms)
     part = 0.5_wp * block_dot(density, terms)
   end function kinetic_energy
+
+  !> V |v|^2 of rows lo to hi.
+  pure subroutine square(lo, hi, volume, v, terms)
+    integer,  intent(in) :: lo, hi
+    real(wp), intent(in), contiguous :: volume(:), v(:, :)
+    real(wp), intent(inout) :: terms(n_block)
+    integer :: i, b
+
+    !$omp simd simdlen(8) private(b)
+    do i = lo, hi
+      b = i - lo + 1
+      terms(b) = volume(i) * (v(i, 1)**2 + v(i, 2)**2)
+    end do
+  end subroutine square
 
   pure real(wp) function strain_energy(block) result(part)
     type(block_view_t), intent(in) :: block
     real(wp) :: terms(n_block)
-    integer  :: n
+    integer  :: i, b
 
-    n = block%hi - block%lo + 1
-    terms = 0.0_wp
+    if (block%hi - block%lo + 1 < n_block) terms = 0.0_wp
     call block%model%materials%energy_block(block%number, block%state%law_points_t, terms)
-    terms(:n) = block%model%points%volume(block%lo:block%hi) * terms(:n)
+    associate (volume => block%model%points%volume)
+      !$omp simd simdlen(8) private(b)
+      do i = block%lo, block%hi
+        b = i - block%lo + 1
+        terms(b) = volume(i) * terms(b)
+      end do
+    end associate
     part = block_sum(terms)
   end function strain_energy
 

@@ -34,9 +34,9 @@ module pd_observe
     type(model_t), pointer :: model => null()
     type(state_t), pointer :: state => null()
     integer  :: number = 0, lo = 1, hi = 0
-    real(wp) :: weight(n_block) = 0.0_wp        !! volume of a point of the body; fictitious: 0
-    real(wp) :: p(n_block, 4) = 0.0_wp          !! first Piola-Kirchhoff stress xx xy yx yy [Pa]
-    real(wp) :: strain(n_block, 4) = 0.0_wp     !! xx yy zz xy
+    real(wp) :: weight(n_block)                 !! volume of a point of the body; fictitious: 0
+    real(wp) :: p(n_block, 4)                   !! first Piola-Kirchhoff stress xx xy yx yy [Pa]
+    real(wp) :: strain(n_block, 4)              !! xx yy zz xy
   end type block_view_t
 
   !> How the parts of the blocks become the value of a column.
@@ -153,6 +153,8 @@ contains
         values(k) = model%blocks%largest(parts(k, :))
       case (smallest)
         values(k) = model%blocks%smallest(parts(k, :))
+      case default   ! no way to join them
+        values(k) = ieee_value(1.0_wp, ieee_quiet_nan)
       end select
     end do
   end subroutine observe_blocks
@@ -186,6 +188,11 @@ contains
     type(state_t),      intent(in)    :: state
     type(block_view_t), intent(inout) :: block
 
+    if (block%hi - block%lo + 1 < n_block) then
+      block%weight = 0.0_wp
+      block%p = 0.0_wp
+      block%strain = 0.0_wp
+    end if
     block%weight(:block%hi - block%lo + 1) = model%points%in_body(block%lo:block%hi) &
       * model%points%volume(block%lo:block%hi)
     call model%materials%strain_block(block%number, state%displacement_gradient, block%strain)

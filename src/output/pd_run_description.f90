@@ -94,10 +94,12 @@ contains
     call write_attribute(file, '/', 'n_frames', n_frames, errors)
     call create_group(file, '/input', errors)
     call write_dataset(file, '/input/namelist', description%namelist, errors)
-    call write_label(file, '/input/namelist', label_t('', '1', 'the input file, byte for byte'), errors)
+    call write_label(file, '/input/namelist', label_t('', '1', &
+      'the input file, byte for byte'), errors)
     if (size(description%values) == 0) return
     call write_dataset(file, '/input/values', description%values, errors)
-    call write_label(file, '/input/values', label_t('', '1', 'the values of the input as used'), errors)
+    call write_label(file, '/input/values', label_t('', '1', &
+      'the values of the input as used'), errors)
   end subroutine write_attributes
 
   subroutine write_points(file, description, errors)
@@ -117,11 +119,13 @@ contains
       'boundary that a fictitious point belongs to, counted from 1; 0: a point of the body'), errors)
     if (allocated(description%yield_stress)) then
       call write_dataset(file, '/points/yield_stress', description%yield_stress, errors)
-      call write_label(file, '/points/yield_stress', label_t('', 'Pa', 'initial yield stress'), errors)
+      call write_label(file, '/points/yield_stress', label_t('', 'Pa', &
+      'initial yield stress'), errors)
     end if
     if (size(description%boundary_names) == 0) return
     call write_dataset(file, '/points/boundary_names', description%boundary_names, errors)
-    call write_label(file, '/points/boundary_names', label_t('', '1', 'names of the boundaries'), errors)
+    call write_label(file, '/points/boundary_names', label_t('', '1', &
+      'names of the boundaries'), errors)
   end subroutine write_points
 
   !> The time now as ISO 8601 in UTC, '2024-05-31T09:30:00Z'.

@@ -69,21 +69,19 @@ contains
     character(:), allocatable :: text
     integer :: c
 
-    text = ''
-    select case (field%width())
-    case (1)
+    if (field%width() == 1) then
       text = attribute(trim(field%name), 'Scalar', whole_item(source, integer_text(n), 'Float', 8))
-    case (2)
+    else if (field%width() == 2) then
       text = attribute(trim(field%name), 'Vector', '<DataItem ItemType="Function" ' &
         //'Function="JOIN($0, $1, 0 * $1)" Dimensions="'//integer_text(n)//' 3">'//nl &
-        //column_item(source, n, 2, 1)//column_item(source, n, 2, 2) &
-        //'</DataItem>'//nl)
-    case (3:)
+        //column_item(source, n, 2, 1)//column_item(source, n, 2, 2)//'</DataItem>'//nl)
+    else
+      text = ''
       do c = 1, field%width()
         text = text//attribute(trim(field%name)//'_'//field%component(c), 'Scalar', &
           column_item(source, n, field%width(), c))
       end do
-    end select
+    end if
   end function field_text
 
   pure function attribute(name, kind_of_field, item) result(text)
