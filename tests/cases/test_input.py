@@ -1,5 +1,7 @@
 """Wrong input: every mistake is named, the exit status is 2, and nothing is written."""
 
+import json
+import subprocess
 from pathlib import Path
 
 import pytest
