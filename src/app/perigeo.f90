@@ -5,7 +5,6 @@
 program perigeo
   use, intrinsic :: iso_fortran_env, only: error_unit, int64, output_unit
   use omp_lib, only: omp_get_max_threads, omp_set_num_threads
-  use pd_boundary, only: boundary_forces
   use pd_checkpoint, only: checkpoint_t
   use pd_command_line, only: options_t, print_help, read_command_line
   use pd_errors, only: error_list_t, exit_calculation, exit_command_line, exit_file, exit_input, &
@@ -131,8 +130,7 @@ contains
     allocate (work%a(model%body%n, 4), source=0.0_wp)   ! voids stay zero
     if (checkpoint%history_rows > 0) then
       state = state%scattered(model%body%points, model%body%n)
-      call boundary_forces(model%body%position, model%body%volume, checkpoint%time, &
-        state%force, model%boundaries)
+      call model%supports%take_reactions(model%body%volume, checkpoint%time, state%force)
     else
       call start(model, state)
       call observe(model%body, model%solid, model%operators, state, ledger, seen)

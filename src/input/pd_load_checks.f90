@@ -10,7 +10,7 @@ module pd_load_checks
   use pd_kinds, only: is_set, wp
   use pd_motion_checks, only: check_increasing
   use pd_namelist, only: max_problems, namelist_group_t, place_of
-  use pd_platens, only: platen_under_load
+  use pd_platen_checks, only: platen_under_load
   use pd_text, only: integer_text, number_text
   implicit none
   private

@@ -9,8 +9,8 @@ module pd_motion_checks
   use pd_input_values, only: group_named, is_damaged, is_given
   use pd_kinds, only: is_set, unset, wp
   use pd_namelist, only: max_problems, namelist_group_t, place_of
-  use pd_platens, only: approach_t, final_rate, largest_approach, platen_approach, platen_extent, &
-    platen_under_load
+  use pd_platen_checks, only: platen_approach, platen_extent, platen_under_load
+  use pd_tables, only: table_t
   use pd_text, only: integer_text, number_text
   implicit none
   private
@@ -246,7 +246,7 @@ contains
     type(namelist_group_t), intent(in)    :: groups(:)
     type(error_list_t),     intent(inout) :: errors
     type(namelist_group_t) :: integration, output
-    type(approach_t) :: approach
+    type(table_t) :: approach
     real(wp) :: extent
 
     integration = group_named(groups, 'integration', 1, input%path)
@@ -287,17 +287,17 @@ contains
       type(namelist_group_t), intent(in) :: group
       character(*),           intent(in) :: key
 
-      if (final_rate(approach) > 0.0_wp) return
+      if (approach%final_rate() > 0.0_wp) return
       if (size(approach%times) == 1) then
         call errors%add('the platens do not approach each other', where=place_of(group, key), &
-                        found='rate of approach '//number_text(final_rate(approach)), &
+                        found='rate of approach '//number_text(approach%final_rate()), &
                         allowed='> 0 [m/s]')
       else if (is_set(extent)) then
-        if (largest_approach(approach, maxval(approach%times)) &
+        if (approach%largest_integral(maxval(approach%times)) &
             < strain*extent*(1.0_wp - 1.0e-9_wp)) &
           call errors%add('the platens never come that near', where=place_of(group, key), &
                           found=number_text(strain), allowed='at most ' &
-                          //number_text(largest_approach(approach, maxval(approach%times))/extent))
+                          //number_text(approach%largest_integral(maxval(approach%times))/extent))
       end if
     end subroutine check_reached
 
@@ -370,7 +370,7 @@ contains
     type(input_t), intent(in) :: input
     logical,       intent(in) :: as_strain
     real(wp) :: last
-    type(approach_t) :: approach
+    type(table_t) :: approach
     real(wp) :: extent
 
     associate (t => input%integration)
@@ -385,10 +385,10 @@ contains
       if (.not. is_set(extent)) return
       approach = platen_approach(input)
       if (as_strain .and. is_set(t%end_time)) then
-        last = largest_approach(approach, t%end_time)/extent
+        last = approach%largest_integral(t%end_time)/extent
       else if (is_set(t%final_strain) .and. size(approach%times) == 1 &
-               .and. final_rate(approach) > 0.0_wp) then
-        last = t%final_strain*extent/final_rate(approach)
+               .and. approach%final_rate() > 0.0_wp) then
+        last = t%final_strain*extent/approach%final_rate()
       end if
     end associate
   end function end_of_run

@@ -1,35 +1,30 @@
 !> Platens as the input describes them: which boundaries they are, and how they come together.
-module pd_platens
+module pd_platen_checks
   use pd_input_types, only: boundary_input_t, input_t
   use pd_kinds, only: is_set, unset, wp
+  use pd_sides, only: normal_axis, outward
+  use pd_tables, only: difference, new_table, table_t
   implicit none
   private
 
-  public :: approach_t, platens_of, platen_approach, platen_extent, final_rate, largest_approach
-  public :: platen_under_load
-
-  !> Rate at which the platens approach each other: linear between the times, constant beyond.
-  type :: approach_t
-    real(wp), allocatable :: times(:)   !! [s], increasing, at least one
-    real(wp), allocatable :: rates(:)   !! [m/s], positive: the distance shrinks
-  end type approach_t
+  public :: platens_of, platen_approach, platen_extent, platen_under_load
 
 contains
 
-  !> Indices of the platens, 'bottom' or 'left' first: exactly two boundaries, on opposite sides,
-  !> neither affine; 0, 0 where there are none.
+  !> Indices of the platens, the one at the lower end of their axis first: exactly two boundaries,
+  !> on opposite sides, neither affine; 0, 0 where there are none.
   pure function platens_of(boundaries) result(platens)
     type(boundary_input_t), intent(in) :: boundaries(:)
-    integer :: platens(2), i
+    integer :: platens(2)
 
     platens = 0
     if (size(boundaries) /= 2) return
-    do i = 1, 2
-      if (boundaries(1)%contact == 'affine' .or. boundaries(2)%contact == 'affine') return
-      if ((boundaries(i)%side == 'bottom' .and. boundaries(3 - i)%side == 'top') &
-          .or. (boundaries(i)%side == 'left' .and. boundaries(3 - i)%side == 'right')) &
-        platens = [i, 3 - i]
-    end do
+    associate (a => boundaries(1), b => boundaries(2))
+      if (a%contact == 'affine' .or. b%contact == 'affine') return
+      if (normal_axis(a%side) /= normal_axis(b%side)) return
+      if (outward(a%side) < outward(b%side)) platens = [1, 2]
+      if (outward(a%side) > outward(b%side)) platens = [2, 1]
+    end associate
   end function platens_of
 
   !> Whether there are platens, and one of them moves under a load: how, only the run will tell.
@@ -44,83 +39,34 @@ contains
     end do
   end function platen_under_load
 
-  !> How the platens of the input approach each other. Needs platens, and tables as long as times.
-  pure function platen_approach(input) result(approach)
+  !> Rate at which the platens of the input approach each other [m/s]. Needs platens, and tables as
+  !> long as times.
+  pure type(table_t) function platen_approach(input) result(approach)
     type(input_t), intent(in) :: input
-    type(approach_t) :: approach
-    integer :: across, i
 
-    associate (first => input%boundaries(input%platens(1)), &
-               second => input%boundaries(input%platens(2)))
-      across = merge(2, 1, first%side == 'bottom')
-      allocate (approach%times, source=merged(first%times, second%times))
-      allocate (approach%rates(size(approach%times)))
-      do i = 1, size(approach%times)
-        approach%rates(i) = velocity_at(first, across, approach%times(i)) &
-          - velocity_at(second, across, approach%times(i))
-      end do
-    end associate
+    approach = difference(velocity_across(input%boundaries(input%platens(1))), &
+      velocity_across(input%boundaries(input%platens(2))))
   end function platen_approach
 
-  !> Two increasing lists as one; a single 0 where both are empty.
-  pure function merged(a, b) result(c)
-    real(wp), intent(in)  :: a(:), b(:)
-    real(wp), allocatable :: c(:)
-    integer :: i, j, n
-
-    allocate (c(max(1, size(a) + size(b))))
-    c(1) = 0.0_wp
-    i = 1
-    j = 1
-    do n = 1, size(a) + size(b)
-      if (j > size(b)) then
-        c(n) = a(i)
-        i = i + 1
-      else if (i > size(a)) then
-        c(n) = b(j)
-        j = j + 1
-      else if (a(i) <= b(j)) then
-        c(n) = a(i)
-        i = i + 1
-      else
-        c(n) = b(j)
-        j = j + 1
-      end if
-    end do
-  end function merged
-
-  !> Component c of the velocity of a boundary at a time [m/s].
-  pure real(wp) function velocity_at(boundary, c, time) result(velocity)
+  !> Velocity of a boundary across its side [m/s].
+  pure type(table_t) function velocity_across(boundary) result(velocity)
     type(boundary_input_t), intent(in) :: boundary
-    integer,                intent(in) :: c
-    real(wp),               intent(in) :: time
 
-    if (size(boundary%times) == 0) then
-      velocity = boundary%velocity(c)
-    else if (c == 1) then
-      velocity = table_at(boundary%times, boundary%velocities_x, time)
+    if (normal_axis(boundary%side) == 1) then
+      velocity = component(boundary%velocities_x, boundary%velocity(1))
     else
-      velocity = table_at(boundary%times, boundary%velocities_y, time)
+      velocity = component(boundary%velocities_y, boundary%velocity(2))
     end if
-  end function velocity_at
 
-  !> A table at a time: linear between its times, constant beyond; 0 where it is empty.
-  pure real(wp) function table_at(times, values, time) result(value)
-    real(wp), intent(in) :: times(:), values(:), time
-    integer :: k, n
+  contains
 
-    value = 0.0_wp
-    n = size(values)
-    if (n == 0) return
-    value = values(n)
-    if (time <= times(1)) value = values(1)
-    do k = 2, n
-      if (time >= times(k)) cycle
-      if (time >= times(k - 1)) value = values(k - 1) &
-        + (values(k) - values(k - 1))*((time - times(k - 1))/(times(k) - times(k - 1)))
-      return
-    end do
-  end function table_at
+    pure type(table_t) function component(rates, constant)
+      real(wp), intent(in) :: rates(:), constant
+
+      component = new_table(boundary%times, rates, constant)
+    end function component
+
+  end function velocity_across
 
   !> Extent of the body between the platens as the set-up will make it [m]; `unset` where it is
   !> not in the input.
@@ -131,7 +77,7 @@ contains
     logical  :: upright
 
     extent = unset
-    upright = input%boundaries(input%platens(1))%side == 'bottom'
+    upright = normal_axis(input%boundaries(input%platens(1))%side) == 2
     lower = huge(1.0_wp)
     upper = -huge(1.0_wp)
     if (size(input%bodies) == 0) return
@@ -151,36 +97,4 @@ contains
     if (extent <= 0.0_wp) extent = unset
   end function platen_extent
 
-  !> Rate of approach after the last time of the tables [m/s].
-  pure real(wp) function final_rate(approach)
-    type(approach_t), intent(in) :: approach
-
-    final_rate = approach%rates(size(approach%rates))
-  end function final_rate
-
-  !> Largest approach of the platens between time 0 and a given time [m], at least 0.
-  pure real(wp) function largest_approach(approach, time) result(largest)
-    type(approach_t), intent(in) :: approach
-    real(wp),         intent(in) :: time
-    real(wp) :: now, rate, rate_before, t, t_before
-    integer  :: k
-
-    largest = 0.0_wp
-    now = 0.0_wp
-    t_before = 0.0_wp
-    rate_before = table_at(approach%times, approach%rates, 0.0_wp)
-    do k = 1, size(approach%times) + 1
-      t = time
-      if (k <= size(approach%times)) t = min(time, approach%times(k))
-      rate = table_at(approach%times, approach%rates, t)
-      ! The rate changes its sign between the two times: the approach has a peak there.
-      if (rate_before > 0.0_wp .and. rate < 0.0_wp) largest = max(largest, now &
-        + 0.5_wp*rate_before*(t - t_before)*(rate_before/(rate_before - rate)))
-      now = now + 0.5_wp*(rate_before + rate)*(t - t_before)
-      largest = max(largest, now)
-      t_before = t
-      rate_before = rate
-    end do
-  end function largest_approach
-
-end module pd_platens
+end module pd_platen_checks

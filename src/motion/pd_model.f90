@@ -1,30 +1,30 @@
 !> The model: everything about a run that does not change while it runs.
 module pd_model
-  use pd_boundary, only: boundary_t, move, platens_t, reference_ends
   use pd_force, only: solid_t
   use pd_geometry, only: body_t
   use pd_kinds, only: wp
-  use pd_loads, only: apply_loads
+  use pd_loads, only: loads_t
   use pd_operators, only: operators_t
-  use pd_pressure, only: pressure_t
+  use pd_platens, only: platens_t, reference_ends
   use pd_stability, only: highest_frequency
   use pd_state, only: state_t
+  use pd_supports, only: supports_t
   use pd_verlet, only: frame_t, motion_t, reference_velocity
   implicit none
   private
 
   public :: model_t, start, damping_frame, find_highest_frequency
 
-  !> Everything about a run that does not change while it runs, and the boundaries with the forces
-  !> of the present step.
+  !> Everything about a run that does not change while it runs, and the supports with the forces of
+  !> the present step.
   type :: model_t
     type(body_t)      :: body
     class(operators_t), allocatable :: operators
     type(solid_t)     :: solid
     type(motion_t)    :: motion
     type(platens_t)   :: platens
-    type(boundary_t), allocatable :: boundaries(:)
-    type(pressure_t), allocatable :: pressures(:)
+    type(supports_t)  :: supports
+    type(loads_t)     :: loads
     real(wp), allocatable :: free(:, :)      !! 1: free, 0: prescribed component (n,2)
     real(wp) :: spacing = 0.0_wp             !! dx [m]
     real(wp) :: delta = 0.0_wp               !! horizon [m]
@@ -49,10 +49,10 @@ contains
     real(wp),      intent(in) :: t   !! [s]
 
     if (model%damped_in_frame) &
-      call reference_ends(model%platens, model%boundaries, t, frame%lower, frame%upper)
+      call reference_ends(model%platens, t, frame%lower, frame%upper)
   end function damping_frame
 
-  !> State at t = 0: undeformed, moving with the frame of the damping, boundaries with theirs; loads
+  !> State at t = 0: undeformed, moving with the frame of the damping, supports with theirs; loads
   !> without a ramp act already.
   subroutine start(model, state)
     type(model_t), intent(in)  :: model
@@ -69,8 +69,9 @@ contains
     do k = 1, 2
       where (model%body%boundary < 0) state%velocity(:, k) = 0.0_wp
     end do
-    call move(model%boundaries, model%body%position, 0.0_wp, state%displacement, state%velocity)
-    call apply_loads(model%pressures, model%boundaries, model%body%volume, 0.0_wp, state%force)
+    call model%supports%prescribe(0.0_wp, state%displacement, state%velocity)
+    call model%loads%add_forces(model%body%volume, 0.0_wp, state%force)
+    call model%supports%share_forces(model%body%volume, 0.0_wp, state%force)
   end subroutine start
 
 end module pd_model

@@ -3,10 +3,8 @@
 !> u gives F, F gives S and A, A gives f, f gives v.
 !> Source: doc/theory.md, section 6.
 module pd_step
-  use pd_boundary, only: boundary_forces, motion_work, move
   use pd_force, only: force_state, internal_force
   use pd_kinds, only: wp
-  use pd_loads, only: apply_loads, load_work
   use pd_observe, only: ledger_t
   use pd_model, only: damping_frame, model_t
   use pd_state, only: block_work_t, state_t
@@ -26,7 +24,7 @@ module pd_step
     logical,  private :: open = .false.
     real(wp), private :: dissipated = 0.0_wp   !! by plastic flow [J/m]
     real(wp), private :: first_work(2) = 0.0_wp   !! of the damping in the first half kick [J/m]
-    real(wp), private :: outer_work = 0.0_wp   !! of prescribed motion and loads [J/m]
+    real(wp), private :: outer_work = 0.0_wp   !! of supports and loads [J/m]
   end type step_work_t
 
 contains
@@ -39,13 +37,13 @@ contains
   subroutine take_step(step, whole, model, state, work, ledger, timing, failed_point)
     integer,        intent(in)    :: step
     logical,        intent(in)    :: whole
-    type(model_t),  intent(inout) :: model          !! its boundaries get their new forces
+    type(model_t),  intent(inout) :: model          !! its supports get their new forces
     type(state_t),  intent(inout) :: state
     type(step_work_t), intent(inout) :: work
     type(ledger_t), intent(inout) :: ledger
     type(timing_t), intent(inout) :: timing
     integer,        intent(out)   :: failed_point
-    real(wp) :: t, t_next, loads_work, second_work(2), first_work(2)
+    real(wp) :: t, t_next, second_work(2), first_work(2)
 
     t = real(step - 1, wp) * model%motion%time_step
     t_next = real(step, wp) * model%motion%time_step
@@ -62,16 +60,16 @@ contains
       end if
       work%first_work = first_work
       call timing%lap(1)
-      call move(model%boundaries, x, t_next, u, v)
-      loads_work = load_work(model%pressures, model%boundaries, v, t, t_next)
+      call model%supports%prescribe(t_next, u, v)
       call timing%lap(6)
       call force_state(model%operators, model%solid, volume, state, work%a, blocks, timing, &
         failed_point)
       work%dissipated = sum(blocks%dissipated)
       call internal_force(model%operators, u, work%a, f, blocks, timing)
-      call apply_loads(model%pressures, model%boundaries, volume, t_next, f)
-      call boundary_forces(x, volume, t_next, f, model%boundaries)
-      work%outer_work = motion_work(model%boundaries, t, t_next) + loads_work
+      call model%loads%add_forces(volume, t_next, f)
+      call model%supports%share_forces(volume, t_next, f)
+      call model%supports%take_reactions(volume, t_next, f)
+      work%outer_work = model%supports%work(v, t, t_next) + model%loads%work(v, t, t_next)
       work%open = .true.
       call timing%lap(6)
       if (.not. whole) return

@@ -3,7 +3,7 @@
 !>   v^{n+1/2} = v^n + dt/2 (f^n - C (v^n - v_ref)) / rho,   u^{n+1} = u^n + dt v^{n+1/2}
 !>   v^{n+1}   = (v^{n+1/2} + dt/2 (f^{n+1} + C v_ref) / rho) / (1 + dt C / (2 rho))
 !>
-!> Prescribed components are left to `pd_boundary`.
+!> Prescribed components are left to `pd_supports`.
 !> Source: doc/theory.md, section 6.
 module pd_verlet
   use pd_kinds, only: block_sum, n_block, wp

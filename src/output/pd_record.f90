@@ -3,7 +3,6 @@
 !> The only module that knows both the physics and the output.
 module pd_record
   use, intrinsic :: iso_fortran_env, only: compiler_version
-  use pd_boundary, only: nominal_strain
   use pd_checkpoint, only: checkpoint_exists, checkpoint_t, read_checkpoint, remove_checkpoints, &
     write_checkpoint
   use pd_errors, only: error_list_t
@@ -15,6 +14,7 @@ module pd_record
   use pd_input_types, only: input_t
   use pd_kinds, only: wp
   use pd_observe, only: ledger_t, observation_t, observe, point_field
+  use pd_platens, only: nominal_strain
   use pd_progress, only: close_progress, open_progress, progress_t, say, show_progress, status_t
   use pd_result, only: create_result, finish_result, frame_source_t, provenance_t, &
     result_exists, result_t, resume_result, run_description_t, write_failed_frame, write_frame
@@ -138,9 +138,9 @@ contains
       if (model%solid%material%plastic) &
         description%yield_stress = model%solid%yield_stress(places)
     end associate
-    allocate (character(64) :: description%boundary_names(size(model%boundaries)))
-    do k = 1, size(model%boundaries)
-      description%boundary_names(k) = model%boundaries(k)%name
+    allocate (character(64) :: description%boundary_names(size(model%supports%items)))
+    do k = 1, size(model%supports%items)
+      description%boundary_names(k) = model%supports%items(k)%support%name
     end do
   end subroutine describe_run
 
@@ -176,10 +176,10 @@ contains
 
     row%step = step
     row%time = real(step, wp) * model%motion%time_step
-    row%strain = strain_at(model, state, row%time)
-    allocate (row%force(size(model%boundaries), 2))
-    do k = 1, size(model%boundaries)
-      row%force(k, :) = model%boundaries(k)%force
+    row%strain = nominal_strain(model%platens, state%displacement)
+    allocate (row%force(size(model%supports%items), 2))
+    do k = 1, size(model%supports%items)
+      row%force(k, :) = model%supports%items(k)%support%force
     end do
     associate (seen => record%seen)
       row%mean_stress_xx = seen%mean_stress_xx
@@ -197,17 +197,6 @@ contains
     call write_row(record%history, row, errors)
   end subroutine record_row
 
-  !> Nominal strain, 0 where there are no platens.
-  pure real(wp) function strain_at(model, state, time) result(strain)
-    type(model_t), intent(in) :: model
-    type(state_t), intent(in) :: state
-    real(wp),      intent(in) :: time   !! [s]
-
-    strain = 0.0_wp
-    if (model%platens%axis > 0) strain = nominal_strain(model%platens, model%boundaries, time, &
-      state%displacement)
-  end function strain_at
-
   !> Write the next frame.
   subroutine record_frame(model, state, step, record, errors)
     type(model_t), target, intent(in) :: model
@@ -221,8 +210,8 @@ contains
     time = real(step, wp) * model%motion%time_step
     source%model => model
     source%state => state
-    call write_frame(record%result, record%frames, step, time, strain_at(model, state, time), &
-      source, errors)
+    call write_frame(record%result, record%frames, step, time, &
+      nominal_strain(model%platens, state%displacement), source, errors)
     record%frames = record%frames + 1
   end subroutine record_frame
 
@@ -239,8 +228,8 @@ contains
     time = real(step, wp) * model%motion%time_step
     source%model => model
     source%state => state
-    call write_failed_frame(record%result, step, time, strain_at(model, state, time), source, &
-      errors)
+    call write_failed_frame(record%result, step, time, &
+      nominal_strain(model%platens, state%displacement), source, errors)
   end subroutine record_failure
 
   !> Points of a frame.
@@ -276,9 +265,10 @@ contains
     status%largest_alpha = record%seen%max_plastic_strain
     if (model%platens%axis > 0) then
       status%has_strain = .true.
-      status%strain = strain_at(model, state, status%time)
-      status%axial_stress = &
-        model%boundaries(model%platens%first)%force(model%platens%axis) / model%platens%width
+      status%strain = nominal_strain(model%platens, state%displacement)
+      associate (first => model%supports%items(model%platens%first)%support)
+        status%axial_stress = first%force(model%platens%axis) / model%platens%width
+      end associate
     end if
     call show_progress(record%progress, status, errors)
   end subroutine record_progress

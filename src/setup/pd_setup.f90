@@ -1,26 +1,25 @@
 !> From checked input to the model: body, operators, material, boundaries, motion, schedule.
 !>
-!> The only module that knows both the input and the physics.
+!> With `pd_setup_loads` the only module that knows both the input and the physics.
 module pd_setup
   use pd_bond_list, only: bond_list_t, new_bond_list
-  use pd_boundary, only: boundary_t, control_by_force, mark_free, new_affine_boundary, new_ramp, &
-    new_rigid_boundary, table_t, time_of_strain
   use pd_cloud, only: read_cloud
   use pd_errors, only: error_list_t
   use pd_families, only: horizon_t, new_horizon
   use pd_force, only: control_stiffness
-  use pd_geometry, only: body_t, lattice_body, lattice_t, layer_t, nearest_count, side_number
+  use pd_geometry, only: body_t, lattice_body, lattice_t, layer_t, nearest_count
   use pd_input, only: resolved_path
-  use pd_input_types, only: boundary_input_t, input_t
+  use pd_input_types, only: input_t
   use pd_j2, only: new_j2
   use pd_kinds, only: is_set, wp
   use pd_kinematics, only: inverse_shape_tensor
   use pd_lattice, only: lattice_operators_t, new_lattice_operators
   use pd_model, only: find_highest_frequency, model_t
-  use pd_pressure, only: spread_pressure, surface_vectors
+  use pd_platens, only: time_of_strain
   use pd_random_field, only: lognormal, longest_way, new_random_field, &
     standard_normal
   use pd_schedule, only: new_schedule, schedule_t
+  use pd_setup_loads, only: set_up_loads, set_up_platens, set_up_supports
   use pd_stability, only: wave_speed
   implicit none
   private
@@ -148,8 +147,10 @@ contains
       model%solid%k_inverse, errors)
     if (errors%count() > 0) return
     call set_up_solid(input, model)
-    call set_up_boundaries(input, model)
-    call set_up_pressures(input, model, errors)
+    call set_up_supports(input, model)
+    call set_up_platens(input, model)
+    call set_up_loads(input, model, errors)
+    call set_up_motion(input, model)
     if (.not. any(model%free > 0.0_wp)) call errors%add('no point is free to move')
   end subroutine set_up_model
 
@@ -229,146 +230,21 @@ contains
     end associate
   end subroutine set_up_yield_stress
 
-  !> Boundaries with their motions, platens, damping.
-  subroutine set_up_boundaries(input, model)
+  !> Inertia and damping.
+  subroutine set_up_motion(input, model)
     type(input_t), intent(in)    :: input
     type(model_t), intent(inout) :: model
-    integer :: k
-
-    allocate (model%boundaries(size(input%boundaries)))
-    do k = 1, size(input%boundaries)
-      model%boundaries(k) = new_boundary(input%boundaries, k, model%body)
-    end do
-    allocate (model%free(model%body%n, 2))
-    call mark_free(model%body%position, model%body%volume, input%material%density, &
-      model%boundaries, model%free)
-    do k = 1, 2
-      where (model%body%boundary < 0) model%free(:, k) = 0.0_wp
-    end do
 
     model%motion%density = input%material%density
     model%motion%damping = input%integration%damping
     model%motion%first = model%operators%first_point
     model%motion%last = model%operators%last_point
-    if (input%platens(1) == 0) return
-    associate (p => model%platens, body => model%body)
-      p%first = input%platens(1)
-      p%second = input%platens(2)
-      p%axis = merge(1, 2, input%boundaries(p%first)%side == 'left')
-      p%start = body%lower(p%axis)
-      p%length = body%upper(p%axis) - body%lower(p%axis)
-      p%width = body%upper(3 - p%axis) - body%lower(3 - p%axis)
-      model%motion%axis = p%axis
-      model%motion%start = p%start
-      model%motion%length = p%length
-    end associate
+    if (model%platens%axis == 0) return
+    model%motion%axis = model%platens%axis
+    model%motion%start = model%platens%start
+    model%motion%length = model%platens%length
     model%damped_in_frame = input%integration%damping_frame == 'platens'
-  end subroutine set_up_boundaries
-
-  !> Pressures on sides of the body.
-  subroutine set_up_pressures(input, model, errors)
-    type(input_t),      intent(in)    :: input
-    type(model_t),      intent(inout) :: model
-    type(error_list_t), intent(inout) :: errors
-    real(wp), allocatable :: vectors(:, :)
-    integer :: depth, k
-
-    allocate (model%pressures(size(input%pressures)))
-    if (size(input%pressures) == 0) return
-    allocate (vectors(model%body%n, 2), source=0.0_wp)
-    call surface_vectors(model%operators, model%body%volume, model%solid%k_inverse, vectors)
-    depth = 2 * ceiling(model%delta / model%spacing - 1.0e-6_wp)   ! families that touch cut ones
-    do k = 1, size(input%pressures)
-      associate (given => input%pressures(k), pressure => model%pressures(k))
-        pressure%name = given%name
-        pressure%side = given%side
-        pressure%value = given%value
-        if (size(given%span) > 0) pressure%span = given%span
-        pressure%factor = new_ramp(given%ramp_time)
-        call spread_pressure(model%body, model%boundaries, vectors, model%spacing, depth, pressure)
-        if (size(pressure%points) == 0) &
-          call errors%add('a pressure acts on no point', '&pressure name = '//given%name)
-      end associate
-    end do
-  end subroutine set_up_pressures
-
-  !> Boundary k of the body.
-  type(boundary_t) function new_boundary(all_given, k, body) result(boundary)
-    type(boundary_input_t), intent(in) :: all_given(:)
-    integer,                intent(in) :: k
-    type(body_t),           intent(in) :: body
-    type(table_t) :: tables(2)
-    integer, allocatable :: points(:)
-    logical  :: prescribed(2)
-    real(wp) :: length(2)
-    integer  :: i
-
-    associate (given => all_given(k))
-      allocate (points(count(body%boundary == k)))
-      points = pack([(i, i=1, body%n)], body%boundary == k)
-      if (given%contact == 'affine') then
-        tables(1) = new_table(given%times, given%factors, 1.0_wp)
-        boundary = new_affine_boundary(given%name, points, given%velocity_gradient, tables(1))
-        return
-      end if
-      prescribed = .true.
-      if (given%contact == 'smooth') then
-        prescribed = [given%side == 'left' .or. given%side == 'right', &
-          given%side == 'bottom' .or. given%side == 'top']
-      end if
-      tables(1) = new_table(given%times, given%velocities_x, given%velocity(1))
-      tables(2) = new_table(given%times, given%velocities_y, given%velocity(2))
-      boundary = new_rigid_boundary(given%name, points, prescribed, tables(1), tables(2))
-      if (size(given%traction) == 0) return
-      length = [(loaded_length(all_given, given%side, i, body), i=1, 2)]
-      call control_by_force(given%traction * length, new_ramp(given%ramp_time), boundary)
-    end associate
-  end function new_boundary
-
-  !> Length of a side that carries component c of a traction [m]: of the body, and of the layers
-  !> at its ends where they slide along c and so stand for a body that goes on.
-  pure real(wp) function loaded_length(given, side_name, c, body) result(length)
-    type(boundary_input_t), intent(in) :: given(:)
-    character(*),           intent(in) :: side_name
-    integer,                intent(in) :: c
-    type(body_t),           intent(in) :: body
-    real(wp) :: ends(2)
-    integer  :: along, last
-
-    along = merge(1, 2, side_name == 'bottom' .or. side_name == 'top')
-    ends = [body%lower(along), body%upper(along)]
-    associate (side => body%sides(side_number(side_name)))
-      last = size(side%points)
-      if (slides(body%boundary(side%points(1)))) ends(1) = side%from(1)
-      if (slides(body%boundary(side%points(last)))) ends(2) = side%to(last)
-      length = sum(max(0.0_wp, min(side%to, ends(2)) - max(side%from, ends(1))))
-    end associate
-
-  contains
-
-    !> Whether a boundary is a layer that slides along c.
-    pure logical function slides(b)
-      integer, intent(in) :: b
-
-      slides = .false.
-      if (b > 0) slides = given(b)%contact == 'smooth' .and. (c == 2 .eqv. &
-        (given(b)%side == 'left' .or. given(b)%side == 'right'))
-    end function slides
-
-  end function loaded_length
-
-  !> Table from the input; without one, a constant.
-  pure type(table_t) function new_table(times, rates, constant) result(table)
-    real(wp), intent(in) :: times(:), rates(:), constant
-
-    if (size(times) > 0 .and. size(rates) > 0) then
-      allocate (table%times(size(times)), source=times)
-      allocate (table%rates(size(times)), source=rates)
-    else
-      allocate (table%times(1), source=0.0_wp)
-      allocate (table%rates(1), source=constant)
-    end if
-  end function new_table
+  end subroutine set_up_motion
 
   !> Time step by the rule asked for, and the steps of the run, its frames and rows.
   !>
@@ -430,7 +306,7 @@ contains
       real(wp), intent(in) :: strain
       character(24) :: text
 
-      time = time_of_strain(model%platens, model%boundaries, strain)
+      time = time_of_strain(model%platens, strain)
       if (time > 0.0_wp) return
       write (text, '(g0.6)') strain
       call errors%add('the motion of the platens never reaches a nominal strain', &
