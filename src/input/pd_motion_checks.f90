@@ -10,6 +10,7 @@ module pd_motion_checks
   use pd_kinds, only: is_set, unset, wp
   use pd_namelist, only: max_problems, namelist_group_t, place_of
   use pd_platen_checks, only: platen_approach, platen_extent, platen_under_load
+  use pd_sides, only: normal_axis
   use pd_tables, only: table_t
   use pd_text, only: integer_text, number_text
   implicit none
@@ -163,22 +164,16 @@ contains
     type(boundary_input_t), intent(in)    :: b
     type(namelist_group_t), intent(in)    :: group
     type(error_list_t),     intent(inout) :: errors
-    character(:), allocatable :: table
+    character(12), parameter :: tables(2) = [character(12) :: 'velocities_x', 'velocities_y']
     integer :: along
 
-    select case (b%side)
-    case ('bottom', 'top')
-      along = 1
-      table = 'velocities_x'
-    case ('left', 'right')
-      along = 2
-      table = 'velocities_y'
-    case default
+    if (normal_axis(b%side) == 0) then
       if (.not. is_damaged(group, 'side')) call errors%add( &
         'a smooth boundary without one side', where=place_of(group, 'side'), &
         found=''''//b%side//'''', allowed='''bottom'', ''top'', ''left'', ''right''')
       return
-    end select
+    end if
+    along = 3 - normal_axis(b%side)
     if (abs(b%velocity(along)) > 0.0_wp) call errors%add( &
       'a smooth boundary does not prescribe the motion along its side', &
       where=place_of(group, 'velocity'), found=number_text(b%velocity(along)), &
@@ -193,7 +188,7 @@ contains
 
       if (any(abs(values) > 0.0_wp)) call errors%add( &
         'a smooth boundary does not prescribe the motion along its side', &
-        where=place_of(group, table), found='values other than 0', &
+        where=place_of(group, tables(along)), found='values other than 0', &
         allowed='0, or contact = ''rough''')
     end subroutine check_zero
 
