@@ -40,16 +40,15 @@ contains
   end function boundary_set
 
   !> Numbers of the points below each point of a side, it included, 0: none.
-  pure subroutine lines_below(side, position, points, spacing, count, lines)
+  pure subroutine lines_below(side, position, spacing, count, lines)
     type(side_t), intent(in) :: side
     real(wp),     intent(in) :: position(:, :)  !! X (n,2) [m]
-    integer,      intent(in) :: points(:)       !! those to look among
     real(wp),     intent(in) :: spacing         !! dx [m]
     integer,      intent(in) :: count           !! points in a line
     integer, allocatable, intent(out) :: lines(:, :)   !! (count, points of the side)
     integer, allocatable :: line(:)
     real(wp) :: step                            ! to the next point inwards
-    integer  :: i, j, k, p
+    integer  :: i, j, k
 
     step = -real(side%outward, wp) * spacing
     allocate (lines(count, size(side%points)), source=0)
@@ -59,8 +58,7 @@ contains
       do k = 1, size(side%points)
         line(nint((x(side%points(k), along) - x(first, along)) / spacing)) = k
       end do
-      do p = 1, size(points)
-        i = points(p)
+      do i = 1, size(position, 1)
         j = nint((x(i, axis) - x(first, axis)) / step) + 1
         k = nint((x(i, along) - x(first, along)) / spacing)
         if (j < 1 .or. j > count .or. k < 0 .or. k > ubound(line, 1)) cycle

@@ -75,7 +75,7 @@ module pd_supports
   type :: supports_t
     type(support_item_t), allocatable :: items(:)
   contains
-    procedure :: mark_free
+    procedure :: mark_prescribed => mark_all_prescribed
     procedure :: prescribe => prescribe_all
     procedure :: share_forces => share_all_forces
     procedure :: take_reactions => take_all_reactions
@@ -134,17 +134,16 @@ contains
 
   ! --- all supports, in their order
 
-  !> Mark the components that move freely with 1, the prescribed ones with 0.
-  pure subroutine mark_free(self, free)
-    class(supports_t), intent(in)  :: self
-    real(wp),          intent(out) :: free(:, :)      !! (n,2)
+  !> Put 0 at all prescribed components.
+  pure subroutine mark_all_prescribed(self, free)
+    class(supports_t), intent(in)    :: self
+    real(wp),          intent(inout) :: free(:, :)    !! 1: free (n,2)
     integer :: k
 
-    free = 1.0_wp
     do k = 1, size(self%items)
       call self%items(k)%support%mark_prescribed(free)
     end do
-  end subroutine mark_free
+  end subroutine mark_all_prescribed
 
   !> Put the prescribed components where they are at time t.
   pure subroutine prescribe_all(self, t, u, v)

@@ -1,25 +1,32 @@
 !> The state of a run: everything that changes from step to step at the points.
+!>
+!> `visit` is the table of its fields: whatever is done with all of them is a visitor.
 module pd_state
-  use pd_kinds, only: n_block, wp
+  use pd_blocks, only: blocks_t
+  use pd_fields, only: allocating_t, counting_t, field_visitor_t, gathering_t, scattering_t, &
+    state_field_t
+  use pd_kinds, only: wp
+  use pd_labels, only: label_t
+  use pd_law, only: law_points_t
   implicit none
   private
 
   public :: state_t, block_work_t
 
-  !> Fields over all n points, fictitious ones included.
-  type :: state_t
-    real(wp), allocatable :: displacement(:, :)          !! u (n,2) [m]
-    real(wp), allocatable :: velocity(:, :)              !! v (n,2) [m/s]
-    real(wp), allocatable :: force(:, :)                 !! internal force density f (n,2) [N/m^3]
-    real(wp), allocatable :: deformation_gradient(:, :)  !! F (n,4) xx xy yx yy
-    real(wp), allocatable :: stress(:, :)                !! S (n,4) xx yy zz xy [Pa]
-    real(wp), allocatable :: plastic_strain(:, :)        !! E^p (n,4) xx yy zz xy
-    real(wp), allocatable :: back_stress(:, :)           !! beta (n,4) xx yy zz xy [Pa]
-    real(wp), allocatable :: alpha(:)                    !! equivalent plastic strain (n)
+  !> Fields over all rows, fictitious points included; stress, history and strength belong to the
+  !> laws.
+  type, extends(law_points_t) :: state_t
+    real(wp), allocatable :: displacement(:, :)            !! u (n,2) [m]
+    real(wp), allocatable :: velocity(:, :)                !! v (n,2) [m/s]
+    real(wp), allocatable :: force(:, :)                   !! force density f (n,2) [N/m^3]
+    real(wp), allocatable :: displacement_gradient(:, :)   !! H = F - I (n,4) xx xy yx yy
+    type(label_t), allocatable :: remembered(:)            !! columns of the history
   contains
+    procedure :: visit
     procedure :: allocate => allocate_state
-    procedure :: gathered
-    procedure :: scattered
+    procedure :: gather
+    procedure :: scatter
+    procedure :: numbers_per_point
   end type state_t
 
   !> What the blocks of points hand back in a step. Added up in the order of the blocks, it has the
@@ -35,66 +42,81 @@ module pd_state
 
 contains
 
-  !> Make room for the blocks of points first to last.
-  subroutine fit(self, first, last)
+  !> Make room for some blocks.
+  subroutine fit(self, blocks)
     class(block_work_t), intent(inout) :: self
-    integer,             intent(in)    :: first, last
-    integer :: n_blocks
+    type(blocks_t),      intent(in)    :: blocks
 
-    n_blocks = (last - first) / n_block + 1
     if (allocated(self%failed)) then
-      if (size(self%failed) == n_blocks) return
+      if (size(self%failed) == blocks%count) return
       deallocate (self%damping, self%dissipated, self%failed, self%times)
     end if
-    allocate (self%damping(4, n_blocks), self%dissipated(n_blocks), self%times(3, n_blocks), &
-      source=0.0_wp)
-    allocate (self%failed(n_blocks), source=0)
+    allocate (self%damping(4, blocks%count), self%dissipated(blocks%count), &
+      self%times(3, blocks%count), source=0.0_wp)
+    allocate (self%failed(blocks%count), source=0)
   end subroutine fit
 
-  !> The unloaded state of n points.
-  subroutine allocate_state(self, n)
-    class(state_t), intent(out) :: self
-    integer,        intent(in)  :: n
+  !> Show all fields to a visitor.
+  subroutine visit(self, visitor)
+    class(state_t),         intent(inout) :: self
+    class(field_visitor_t), intent(inout) :: visitor
+    character(*), parameter :: tensor = 'xx yy zz xy'
 
-    allocate (self%displacement(n, 2), self%velocity(n, 2), self%force(n, 2), source=0.0_wp)
-    allocate (self%deformation_gradient(n, 4), source=0.0_wp)
-    self%deformation_gradient(:, [1, 4]) = 1.0_wp
-    allocate (self%stress(n, 4), self%plastic_strain(n, 4), self%back_stress(n, 4), source=0.0_wp)
-    allocate (self%alpha(n), source=0.0_wp)
+    call visitor%field(state_field_t('displacement', 'm', 'displacement u', 'x y', &
+      by_neighbours=.true.), self%displacement)
+    call visitor%field(state_field_t('velocity', 'm/s', 'velocity v', 'x y'), self%velocity)
+    call visitor%field(state_field_t('force', 'N/m^3', 'force density f, loads and control '// &
+      'included', 'x y'), self%force)
+    call visitor%field(state_field_t('displacement_gradient', '1', 'H = F - I', 'xx xy yx yy'), &
+      self%displacement_gradient)
+    call visitor%field(state_field_t('stress', 'Pa', 'stress conjugate to the strain', tensor), &
+      self%stress)
+    call visitor%field(state_field_t('strength', 'Pa', 'initial strength', '', &
+      kept=.false.), self%strength)
+    call visitor%field(state_field_t('history', '', 'what the laws remember', '', &
+      columns=self%remembered), self%history)
+  end subroutine visit
+
+  !> The unloaded state of n rows.
+  subroutine allocate_state(self, n, remembered)
+    class(state_t), intent(inout) :: self
+    integer,        intent(in)    :: n
+    type(label_t),  intent(in)    :: remembered(:)   !! columns of the history
+    type(allocating_t) :: room
+
+    self%remembered = remembered
+    room%n = n
+    call self%visit(room)
   end subroutine allocate_state
 
-  !> The state of some places only, in their order.
-  function gathered(self, places) result(state)
-    class(state_t), intent(in) :: self
-    integer,        intent(in) :: places(:)
-    type(state_t) :: state
+  !> Reduce the fields that a restart needs to some rows, in their order, and give up the others.
+  subroutine gather(self, places)
+    class(state_t), intent(inout) :: self
+    integer,        intent(in)    :: places(:)
+    type(gathering_t) :: choice
 
-    allocate (state%displacement(size(places), 2), source=self%displacement(places, :))
-    allocate (state%velocity(size(places), 2), source=self%velocity(places, :))
-    allocate (state%force(size(places), 2), source=self%force(places, :))
-    allocate (state%deformation_gradient(size(places), 4), &
-      source=self%deformation_gradient(places, :))
-    allocate (state%stress(size(places), 4), source=self%stress(places, :))
-    allocate (state%plastic_strain(size(places), 4), source=self%plastic_strain(places, :))
-    allocate (state%back_stress(size(places), 4), source=self%back_stress(places, :))
-    allocate (state%alpha(size(places)), source=self%alpha(places))
-  end function gathered
+    allocate (choice%places, source=places)
+    call self%visit(choice)
+  end subroutine gather
 
-  !> The state of n places from that of some of them; the others are unloaded and at rest.
-  function scattered(self, places, n) result(state)
-    class(state_t), intent(in) :: self
-    integer,        intent(in) :: places(:), n
-    type(state_t) :: state
+  !> The state of n rows from that of some of them; the others are unloaded and at rest.
+  subroutine scatter(self, places, n)
+    class(state_t), intent(inout) :: self
+    integer,        intent(in)    :: places(:), n
+    type(scattering_t) :: spread_out
 
-    call state%allocate(n)
-    state%displacement(places, :) = self%displacement
-    state%velocity(places, :) = self%velocity
-    state%force(places, :) = self%force
-    state%deformation_gradient(places, :) = self%deformation_gradient
-    state%stress(places, :) = self%stress
-    state%plastic_strain(places, :) = self%plastic_strain
-    state%back_stress(places, :) = self%back_stress
-    state%alpha(places) = self%alpha
-  end function scattered
+    allocate (spread_out%places, source=places)
+    spread_out%n = n
+    call self%visit(spread_out)
+  end subroutine scatter
+
+  !> Numbers per point in all fields.
+  integer function numbers_per_point(self) result(numbers)
+    class(state_t), intent(inout) :: self   !! visited, not changed
+    type(counting_t) :: count
+
+    call self%visit(count)
+    numbers = count%numbers
+  end function numbers_per_point
 
 end module pd_state

@@ -5,7 +5,6 @@
 module pd_setup_loads
   use pd_affine_support, only: new_affine_support
   use pd_errors, only: error_list_t
-  use pd_geometry, only: body_t
   use pd_input_types, only: boundary_input_t, input_t, pressure_input_t
   use pd_kinds, only: wp
   use pd_loaded_platen, only: new_loaded_platen
@@ -29,35 +28,32 @@ contains
   subroutine set_up_supports(input, model)
     type(input_t), intent(in)    :: input
     type(model_t), intent(inout) :: model
-    real(wp) :: mass(model%body%n)
-    integer  :: k
+    real(wp), allocatable :: mass(:)
+    integer :: k
 
-    mass = input%material%density * model%body%volume
+    mass = input%material%density * model%points%volume
     allocate (model%supports%items(size(input%boundaries)))
     do k = 1, size(input%boundaries)
-      call new_support(input%boundaries, k, model%body, mass, model%supports%items(k)%support)
+      call new_support(input%boundaries, k, mass, model, model%supports%items(k)%support)
     end do
-    allocate (model%free(model%body%n, 2))
-    call model%supports%mark_free(model%free)
-    do k = 1, 2
-      where (model%body%boundary < 0) model%free(:, k) = 0.0_wp
-    end do
+    call model%supports%mark_prescribed(model%points%free)
   end subroutine set_up_supports
 
   !> Support number k, of the kind that its boundary asks for.
-  subroutine new_support(given, k, body, mass, support)
+  subroutine new_support(given, k, mass, model, support)
     type(boundary_input_t), intent(in) :: given(:)
-    integer,      intent(in) :: k
-    type(body_t), intent(in) :: body
-    real(wp),     intent(in) :: mass(:)          !! rho V (n) [kg/m]
+    integer,       intent(in) :: k
+    real(wp),      intent(in) :: mass(:)          !! rho V (n) [kg/m]
+    type(model_t), intent(in) :: model
     class(support_t), allocatable, intent(out) :: support
     type(point_set_t) :: set
 
-    associate (b => given(k))
+    associate (b => given(k), body => model%body)
       set = boundary_set(b%name, body%boundary, k)
+      set%points = model%operators%storage%row(set%points)
       if (b%contact == 'affine') then
         allocate (support, source=new_affine_support(set, b%velocity_gradient, &
-          new_table(b%times, b%factors, 1.0_wp), body%position, mass))
+          new_table(b%times, b%factors, 1.0_wp), model%points%position, mass))
       else if (size(b%traction) > 0) then
         allocate (support, source=new_loaded_platen(set, taken(b), b%traction, &
           loaded_lengths(given, body%sides(side_number(b%side)), body%boundary), b%ramp_time))
@@ -130,54 +126,58 @@ contains
     type(input_t),      intent(in)    :: input
     type(model_t),      intent(inout) :: model
     type(error_list_t), intent(inout) :: errors
+    real(wp), allocatable :: vectors(:, :)
     integer :: k
 
     allocate (model%loads%items(size(input%pressures)))
+    if (size(input%pressures) == 0) return
+    allocate (vectors(model%operators%n, 2), source=0.0_wp)
+    call surface_vectors(model%operators, model%points%volume, vectors)
     do k = 1, size(input%pressures)
-      call new_pressure_load(input%pressures(k), input%boundaries, model, &
+      call new_pressure_load(input%pressures(k), input%boundaries, vectors, model, &
         model%loads%items(k)%load, errors)
     end do
   end subroutine set_up_loads
 
   !> A pressure on a side of the body.
-  subroutine new_pressure_load(given, boundaries, model, load, errors)
+  subroutine new_pressure_load(given, boundaries, vectors, model, load, errors)
     type(pressure_input_t), intent(in)    :: given
     type(boundary_input_t), intent(in)    :: boundaries(:)
+    real(wp),               intent(in)    :: vectors(:, :)   !! N in the rows of fields (n,2) [m]
     type(model_t),          intent(in)    :: model
     class(load_t), allocatable, intent(out) :: load
     type(error_list_t),     intent(inout) :: errors
     type(pressure_t) :: pressure
 
     pressure = new_pressure(given%name, given%side, given%value, given%span, given%ramp_time)
-    call spread_pressure(surface_of(given%side, boundaries, model), pressure)
+    call spread_pressure(surface_of(given%side, boundaries, vectors, model), pressure)
+    pressure%points = model%operators%storage%row(pressure%points)
     if (size(pressure%points) == 0) &
       call errors%add('a pressure acts on no point', '&pressure name = '//given%name)
     allocate (load, source=pressure)
   end subroutine new_pressure_load
 
   !> A side of the body with the points below it and their weights.
-  type(surface_t) function surface_of(name, boundaries, model) result(surface)
+  type(surface_t) function surface_of(name, boundaries, vectors, model) result(surface)
     character(*),           intent(in) :: name
     type(boundary_input_t), intent(in) :: boundaries(:)
+    real(wp),               intent(in) :: vectors(:, :)   !! N in the rows of fields (n,2) [m]
     type(model_t),          intent(in) :: model
-    real(wp), allocatable :: vectors(:, :)
-    integer :: i
     logical :: components(2)
+    integer :: i
 
     associate (body => model%body)
       surface%side = body%sides(side_number(name))
       surface%spacing = model%spacing
       ! families that touch cut ones
       surface%depth = 2 * ceiling(model%delta / model%spacing - 1.0e-6_wp)
-      call lines_below(surface%side, body%position, body%points, model%spacing, &
-        2 * surface%depth + 2, surface%lines)
-      allocate (vectors(body%n, 2), source=0.0_wp)
-      call surface_vectors(model%operators, body%volume, model%solid%k_inverse, vectors)
-      surface%weights = vectors(:, surface%side%axis)
+      call lines_below(surface%side, body%position, model%spacing, 2 * surface%depth + 2, &
+        surface%lines)
+      surface%weights = vectors(model%operators%storage%row, surface%side%axis)
       surface%in_body = body%boundary == 0
       allocate (surface%slides(body%n), source=.true.)
       do i = 1, body%n
-        if (body%boundary(i) <= 0) cycle
+        if (body%boundary(i) == 0) cycle
         components = taken(boundaries(body%boundary(i)))
         surface%slides(i) = .not. components(surface%side%axis)
       end do
