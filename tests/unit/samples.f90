@@ -1,7 +1,7 @@
 !> Small bodies, fields and random numbers that the suites of the physics modules share.
 module samples
   use, intrinsic :: iso_fortran_env, only: int64
-  use pd_blocks, only: new_blocks
+  use pd_blocks, only: blocks_t, new_blocks
   use pd_bond_list, only: bond_list_t, new_bond_list
   use pd_elastic, only: new_elastic
   use pd_errors, only: error_list_t
@@ -156,11 +156,12 @@ contains
     material%youngs_modulus = 50.0e6_wp
   end function new_material
 
-  !> Materials of rows that begin with the first block: 1 is the first, 2 the second.
-  function materials_of(rows, first, second) result(materials)
+  !> Materials of rows, 1 is the first, 2 the second. The blocks begin with row 1 unless given.
+  function materials_of(rows, first, second, blocks) result(materials)
     integer,          intent(in)           :: rows(:)
     type(material_t), intent(in)           :: first
     type(material_t), intent(in), optional :: second
+    type(blocks_t),   intent(in), optional :: blocks
     type(materials_t) :: materials
 
     if (present(second)) then
@@ -170,14 +171,19 @@ contains
       allocate (materials%list(1))
     end if
     materials%list(1) = first
-    call divide_into_runs(new_blocks(1, size(rows)), rows, materials)
+    if (present(blocks)) then
+      call divide_into_runs(blocks, rows, materials)
+    else
+      call divide_into_runs(new_blocks(1, size(rows)), rows, materials)
+    end if
   end function materials_of
 
   !> One material in n rows: a law or, without one, E = 50 MPa with Poisson's ratio 0.3 or another.
-  function material_of(n, poissons_ratio, law) result(materials)
-    integer,      intent(in)           :: n
-    real(wp),     intent(in), optional :: poissons_ratio
-    class(law_t), intent(in), optional :: law
+  function material_of(n, poissons_ratio, law, blocks) result(materials)
+    integer,        intent(in)           :: n
+    real(wp),       intent(in), optional :: poissons_ratio
+    class(law_t),   intent(in), optional :: law
+    type(blocks_t), intent(in), optional :: blocks
     type(materials_t) :: materials
     real(wp) :: nu
     integer  :: i
@@ -185,9 +191,9 @@ contains
     nu = 0.3_wp
     if (present(poissons_ratio)) nu = poissons_ratio
     if (present(law)) then
-      materials = materials_of([(1, i=1, n)], new_material(law))
+      materials = materials_of([(1, i=1, n)], new_material(law), blocks=blocks)
     else
-      materials = materials_of([(1, i=1, n)], new_material(new_elastic(50.0e6_wp, nu)))
+      materials = materials_of([(1, i=1, n)], new_material(new_elastic(50.0e6_wp, nu)), blocks=blocks)
     end if
   end function material_of
 
