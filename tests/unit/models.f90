@@ -1,12 +1,15 @@
 !> Models from the texts of input files, for the suites of what reads and translates them.
 module models
+  use pd_clock, only: clock_t
   use pd_errors, only: error_list_t
   use pd_input, only: read_input
   use pd_input_types, only: input_t
   use pd_kinds, only: wp
   use pd_model, only: model_t
   use pd_schedule, only: schedule_t
-  use pd_setup, only: set_up_body, set_up_model, set_up_schedule
+  use pd_setup, only: set_up_model
+  use pd_setup_body, only: set_up_body
+  use pd_setup_schedule, only: set_up_schedule
   implicit none
   private
 
@@ -32,6 +35,7 @@ module models
     type(input_t)    :: input
     type(model_t)    :: model
     type(schedule_t) :: schedule
+    type(clock_t)    :: clock
     type(error_list_t) :: warnings, errors
   end type made_t
 
@@ -42,11 +46,9 @@ contains
     character(*), intent(in) :: groups
     real(wp),     intent(in), optional :: time_step
     type(made_t) :: made
-    real(wp) :: dt
-    integer  :: unit
+    integer :: unit
 
-    dt = 0.0_wp
-    if (present(time_step)) dt = time_step
+    if (present(time_step)) made%clock%time_step = time_step
     open (newunit=unit, file='case.nml', access='stream', status='replace', action='write')
     write (unit) groups//achar(10)
     close (unit)
@@ -56,7 +58,7 @@ contains
     if (made%errors%count() > 0) return
     call set_up_model(made%input, made%model, made%errors)
     if (made%errors%count() > 0) return
-    call set_up_schedule(made%input, dt, made%model, made%schedule, made%errors)
+    call set_up_schedule(made%input, made%clock, made%model, made%schedule, made%errors)
   end function made_of
 
   !> The first problem, '' where there is none.

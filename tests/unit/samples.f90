@@ -262,7 +262,7 @@ contains
     allocate (model%points%place(body%n), model%points%in_body(body%n), source=0.0_wp)
     where (body%boundary == 0) model%points%in_body = 1.0_wp
     allocate (model%strength(body%n), source=0.15e6_wp)
-    allocate (model%boundaries(0), model%pressures(0))
+    allocate (model%supports%items(0), model%loads%items(0))
   end function model_of
 
   !> G[u] of all rows.
