@@ -29,9 +29,10 @@ contains
     type(input_t), intent(in)    :: input
     type(model_t), intent(inout) :: model
     real(wp), allocatable :: mass(:)
-    integer :: k
+    integer :: k, n
 
-    mass = input%material%density * model%points%volume
+    n = size(model%points%volume)
+    allocate (mass(n), source=model%materials%density_of(n) * model%points%volume)
     allocate (model%supports%items(size(input%boundaries)))
     do k = 1, size(input%boundaries)
       call new_support(input%boundaries, k, mass, model, model%supports%items(k)%support)
