@@ -5,8 +5,8 @@ module pd_text
   implicit none
   private
 
-  public :: numbers_text, lower_case, is_name, nearest_name, quoted_list, shortened
-  public :: number_text, integer_text, read_number, read_integer
+  public :: lower_case, is_name, nearest_name, quoted_list, shortened
+  public :: number_text, numbers_text, short_number, integer_text, read_number, read_integer
 
   character(*), parameter :: digits = '0123456789'
   character(*), parameter :: letters = 'abcdefghijklmnopqrstuvwxyz'
@@ -167,6 +167,28 @@ contains
       text = shown(1:1)//'.'//shown(2:)//'e'//integer_text(exponent)
     end if
   end function placed_point
+
+  !> A number with up to five significant digits.
+  pure function short_number(x) result(text)
+    real(wp), intent(in) :: x
+    character(:), allocatable :: text
+    character(24) :: buffer
+    character(8)  :: form
+    integer :: decimals
+
+    if (abs(x) >= 1.0e7_wp .or. (abs(x) < 1.0e-3_wp .and. abs(x) > 0.0_wp)) then
+      write (buffer, '(es12.4)') x
+    else if (abs(x - anint(x)) <= 1.0e-9_wp * abs(x)) then
+      write (buffer, '(i0)') nint(x)
+    else
+      decimals = max(0, 4 - floor(log10(abs(x))))
+      write (form, '(a,i0,a)') '(f24.', decimals, ')'
+      write (buffer, form) x
+      if (decimals > 0) buffer = buffer(:verify(trim(buffer), '0', back=.true.))
+      if (buffer(len_trim(buffer):) == '.') buffer = buffer(:len_trim(buffer) - 1)
+    end if
+    text = trim(adjustl(buffer))
+  end function short_number
 
   !> Read a real number: [+-]digits[.digits][e|d[+-]digits]. What is wrong with it in `problem`,
   !> empty where nothing is.

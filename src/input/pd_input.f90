@@ -10,7 +10,7 @@ module pd_input
   use pd_load_checks, only: check_loads
   use pd_motion_checks, only: check_motion
   use pd_namelist, only: namelist_group_t, read_text_file, scan_namelist
-  use pd_platens, only: platens_of
+  use pd_platen_checks, only: platens_of
   use pd_settings, only: apply_settings, setting_t
   use pd_used_values, only: compare_used, used_values
   implicit none
