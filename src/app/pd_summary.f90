@@ -1,13 +1,13 @@
 !> The derived figures of a run in words: what `--check` prints and the log begins with.
 module pd_summary
   use, intrinsic :: iso_fortran_env, only: int64
-  use pd_force, only: linear_force
-  use pd_input_types, only: input_t, random_field_input_t
+  use pd_clock, only: clock_t
+  use pd_forces, only: linear_forces
+  use pd_input_types, only: input_t, material_input_t, random_field_input_t
   use pd_kinds, only: is_set, wp
   use pd_random_field, only: spread_of, spread_t
-  use pd_model, only: model_t
   use pd_schedule, only: schedule_t
-  use pd_stability, only: wave_speed
+  use pd_model, only: model_t
   use pd_state, only: state_t
   implicit none
   private
@@ -43,9 +43,10 @@ contains
   end subroutine add
 
   !> Points, bonds, lengths, time step, steps, memory.
-  function summarise(input, model, schedule) result(summary)
+  function summarise(input, model, clock, schedule) result(summary)
     type(input_t),    intent(in) :: input
     type(model_t),    intent(in) :: model
+    type(clock_t),    intent(in) :: clock
     type(schedule_t), intent(in) :: schedule
     type(summary_t) :: summary
     character(:), allocatable :: text
@@ -56,18 +57,18 @@ contains
       call summary%add('title', input%run%title)
       call summary%add('body', number(body%upper(1) - body%lower(1))//' m x '// &
         number(body%upper(2) - body%lower(2))//' m')
-      call summary%add('points', whole(size(body%points))//', of which fictitious '// &
+      call summary%add('points', whole(body%n)//', of which fictitious '// &
         whole(count(body%boundary > 0)))
       call model%operators%fewest_bonds(fewest, point)
       call summary%add('bonds', number(bonds)//'; per point '// &
-        number(bonds / real(size(body%points), wp))// &
+        number(bonds / real(body%n, wp))// &
         ' on average, '//whole(fewest)//' at least')
       call summary%add('horizon', number(model%delta)//' m, spacing '// &
         number(model%spacing)//' m: m = '//number(model%delta / model%spacing))
-      call summary%add('wave speed', 'c_p = '//number(wave_speed(model%solid))//' m/s')
-      call add_field(input%random_field, model, summary)
-      courant = model%spacing / wave_speed(model%solid)
-      text = number(schedule%time_step)//' s = '//number(schedule%time_step / courant)// &
+      call summary%add('wave speed', 'c_p = '//number(model%materials%wave_speed())//' m/s')
+      call add_field(input%random_field, input%material, model, summary)
+      courant = model%spacing / model%materials%wave_speed()
+      text = number(clock%time_step)//' s = '//number(clock%time_step / courant)// &
         ' dx/c_p, rule '//input%integration%time_step_rule
       if (input%integration%time_step_rule /= 'fixed') &
         text = text//', safety '//number(input%integration%safety)
@@ -87,15 +88,16 @@ contains
   end function summarise
 
   !> The random field and what it has come to over the body, the weak patch included.
-  subroutine add_field(field, model, summary)
+  subroutine add_field(field, material, model, summary)
     type(random_field_input_t), intent(in)    :: field
+    type(material_input_t),     intent(in)    :: material
     type(model_t),              intent(in)    :: model
     type(summary_t),            intent(inout) :: summary
     type(spread_t) :: spread
     integer :: weaker
 
     if (.not. is_set(field%coefficient_of_variation)) return
-    associate (strength => model%solid%yield_stress, material => model%solid%material, &
+    associate (strength => model%strength(model%operators%storage%row), &
       inside => model%body%boundary == 0)
       spread = spread_of(strength, model%body%volume, inside)
       weaker = 0
@@ -132,7 +134,7 @@ contains
     do k = 1, size(input%pressures)
       associate (given => input%pressures(k), pressure => model%pressures(k))
         on = ' m of the body'
-        if (any(model%body%boundary(pressure%points) > 0)) on = on//' and layers that continue it'
+        if (any(model%points%in_body(pressure%points) < 0.5_wp)) on = on//' and layers that continue it'
         call summary%add('pressure', given%name//': '//number(given%value)//' Pa on '// &
           given%side//', '//number(pressure%length)//on//', '// &
           whole(size(pressure%points))//' points: '//number(abs(sum(pressure%force)))// &
@@ -159,7 +161,7 @@ contains
     type(state_t) :: state
 
     memory = model%operators%memory() &
-      + real(model%body%n, wp) * 8.0_wp * real(state%numbers_per_point() + 10 + 4 + 5, wp)
+      + real(model%operators%n, wp) * 8.0_wp * real(state%numbers_per_point() + 10 + 4 + 5, wp)
   end function memory
 
   !> Wall clock time of the run [s], from the fastest of a few applications of the linear operator
@@ -170,16 +172,16 @@ contains
     !> A step with radial return, motion and energies against one with the linear operator.
     real(wp), parameter :: whole_step = 1.5_wp
     integer,  parameter :: repetitions = 5
-    real(wp), allocatable :: u(:, :), h(:, :), a(:, :), f(:, :)
+    real(wp), allocatable :: u(:, :), h(:, :), f(:, :)
     integer(int64) :: start, finish, rate
     integer :: k
 
-    allocate (h(model%body%n, 4), a(model%body%n, 4), f(model%body%n, 2), source=0.0_wp)
-    allocate (u(model%body%n, 2), source=0.0_wp)
+    allocate (h(model%operators%n, 4), f(model%operators%n, 2), source=0.0_wp)
+    allocate (u(model%operators%n, 2), source=0.0_wp)
     seconds = huge(1.0_wp)
     do k = 1, repetitions
       call system_clock(start, rate)
-      call linear_force(model%operators, model%solid, u, h, a, f)
+      call linear_forces(model%operators, model%materials, u, h, f)
       call system_clock(finish)
       seconds = min(seconds, real(finish - start, wp) / real(rate, wp))
     end do

@@ -9,10 +9,14 @@ module pd_timing
   private
 
   public :: timing_t, kernel_names, now
+  public :: kernel_motion, kernel_gradient, kernel_force, kernel_boundaries, kernel_history
 
   !> Names of the kernels in the order of `timing_t%seconds`.
-  character(10), parameter :: kernel_names(7) = [character(10) :: 'motion', 'gradient', 'stress', &
-    'divergence', 'control', 'boundaries', 'history']
+  character(10), parameter :: kernel_names(6) = [character(10) :: 'motion', 'gradient', 'stress', &
+    'force', 'boundaries', 'history']
+  !> Their numbers; gradient and stress run block by block in one loop, see `lap_blocks`.
+  integer, parameter :: kernel_motion = 1, kernel_gradient = 2, kernel_force = 4, &
+    kernel_boundaries = 5, kernel_history = 6
   integer, parameter :: timed_step = 20   !! every so many steps the blocks are timed
 
   !> Wall clock time spent in each kernel [s].

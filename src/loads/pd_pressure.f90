@@ -7,7 +7,7 @@
 module pd_pressure
   use pd_boundary, only: boundary_t, table_t
   use pd_geometry, only: body_t, side_number, side_t
-  use pd_kinds, only: wp
+  use pd_kinds, only: n_block, wp
   use pd_operators, only: operators_t
   implicit none
   private
@@ -29,18 +29,32 @@ module pd_pressure
 contains
 
   !> N_i = V_i sum_j omega V_j (K_i^-1 + K_j^-1) xi: a homogeneous stress P leaves the force P N_i
-  !> on point i. Zero inside; the sum over a surface is its length, directed into the body.
-  subroutine surface_vectors(operators, volume, k_inverse, vectors)
-    class(operators_t), intent(in)  :: operators
-    real(wp),           intent(in),  contiguous :: volume(:)         !! V (n) [m^2]
-    real(wp),           intent(in),  contiguous :: k_inverse(:, :)   !! (n,3) xx yy xy [1/m^4]
-    real(wp),           intent(inout), contiguous :: vectors(:, :)   !! out: N (n,2) [m]; voids: 0
-    real(wp), allocatable :: a(:, :)
+  !> on point i. Zero inside; the sum over a surface is its length, directed into the body. It is
+  !> what the operators make of a stress of 1.
+  subroutine surface_vectors(operators, volume, vectors)
+    class(operators_t), intent(inout) :: operators
+    real(wp),           intent(in),  contiguous :: volume(:)       !! V (n) [m^2]
+    real(wp),           intent(inout), contiguous :: vectors(:, :) !! out: N (n,2) [m]
+    real(wp), allocatable :: u(:, :), h(:, :)
+    real(wp) :: p(n_block, 4)
+    integer  :: block, lo, hi
 
-    allocate (a(size(volume), 4))
-    a = k_inverse(:, [1, 3, 3, 2])
-    call operators%divergence(a, vectors)
-    vectors = spread(volume, 2, 2) * vectors
+    allocate (u(size(volume), 2), h(size(volume), 4), source=0.0_wp)
+    p(:, [1, 4]) = 1.0_wp
+    p(:, [2, 3]) = 0.0_wp
+    call operators%take_in(u)
+    do block = 1, operators%domain%blocks%count
+      lo = operators%domain%blocks%lo(block)
+      call operators%hand_over_block(lo, operators%domain%blocks%hi(block), h, p)
+    end do
+    call operators%share()
+    do block = 1, operators%domain%blocks%count
+      lo = operators%domain%blocks%lo(block)
+      hi = operators%domain%blocks%hi(block)
+      call operators%force_block(lo, hi, u, vectors)
+      vectors(lo:hi, 1) = volume(lo:hi) * vectors(lo:hi, 1)
+      vectors(lo:hi, 2) = volume(lo:hi) * vectors(lo:hi, 2)
+    end do
   end subroutine surface_vectors
 
   !> Give each point its part of a pressure. Every line of points across the side carries the
@@ -124,7 +138,7 @@ contains
     integer,      intent(in) :: count
     integer, allocatable, intent(out) :: at(:, :)     !! (count, points of the side)
     integer, allocatable :: line(:)
-    integer :: i, j, k, p
+    integer :: i, j, k
 
     allocate (at(count, size(side%points)), source=0)
     associate (x => body%position, first => side%points(1), last => side%points(size(side%points)))
@@ -132,8 +146,7 @@ contains
       do k = 1, size(side%points)
         line(nint((x(side%points(k), 3 - axis) - x(first, 3 - axis)) / abs(step))) = k
       end do
-      do p = 1, size(body%points)
-        i = body%points(p)
+      do i = 1, body%n
         j = nint((x(i, axis) - x(first, axis)) / step) + 1
         k = nint((x(i, 3 - axis) - x(first, 3 - axis)) / abs(step))
         if (j < 1 .or. j > count .or. k < 0 .or. k > ubound(line, 1)) cycle

@@ -1,34 +1,32 @@
-!> J2 plasticity at one point: elastic law and radial return with kinematic and isotropic
-!> hardening or softening, the latter bounded by a residual strength.
+!> J2 plasticity: linear elasticity and radial return with kinematic and isotropic hardening or
+!> softening, the latter bounded by a residual strength.
 !>
 !> Symmetric tensors: xx yy zz xy. Source: doc/theory.md, section 3; Simo & Hughes (1998),
 !> chapter 3.
 module pd_j2
+  use pd_elastic, only: elastic_t, new_elastic
   use pd_kinds, only: n_block, wp
-  use pd_state, only: state_t
+  use pd_labels, only: label_t
+  use pd_law, only: flow_t, law_points_t, law_t
+  use pd_tensors, only: inner, norm
   implicit none
   private
 
-  public :: j2_t, j2_history_t, new_j2, elastic_stress, radial_return, stress_block, elastic_energy
-  public :: elastic_stress_block, elastic_energy_block
-  public :: deviator, norm, inner, von_mises
+  public :: j2_t, new_j2
 
-  !> Material constants [Pa]; the yield stress belongs to the point (it may carry a flaw).
-  type :: j2_t
-    logical  :: plastic = .false.
-    real(wp) :: lambda = 0.0_wp            !! Lame's first constant
-    real(wp) :: shear_modulus = 0.0_wp     !! G
+  !> Material constants [Pa]; the initial yield stress belongs to the point (it may carry a flaw).
+  type, extends(elastic_t) :: j2_t
     real(wp) :: kinematic_modulus = 0.0_wp !! H_k
     real(wp) :: isotropic_modulus = 0.0_wp !! H_i
     real(wp) :: residual_strength = 0.0_wp !! sigma_r; at weaker points sigma_y0 takes its place
+  contains
+    procedure, nopass :: remembers
+    procedure :: stress_block
+    procedure :: reduced
   end type j2_t
 
-  !> What a point remembers.
-  type :: j2_history_t
-    real(wp) :: plastic_strain(4) = 0.0_wp !! E^p
-    real(wp) :: back_stress(4) = 0.0_wp    !! beta [Pa]
-    real(wp) :: alpha = 0.0_wp             !! equivalent plastic strain
-  end type j2_history_t
+  !> Columns of the history: E^p, beta (xx yy zz xy each) and alpha.
+  integer, parameter :: plastic_strain = 0, back_stress = 4, alpha = 9
 
   !> Points that yield, gathered from a block: the loops over them run with unit stride.
   type :: yielding_t
@@ -45,103 +43,50 @@ module pd_j2
 
 contains
 
-  !> Material from engineering constants.
-  pure type(j2_t) function new_j2(youngs_modulus, poissons_ratio) result(material)
+  !> The law of engineering constants.
+  pure type(j2_t) function new_j2(youngs_modulus, poissons_ratio, kinematic_modulus, &
+    isotropic_modulus, residual_strength) result(law)
     real(wp), intent(in) :: youngs_modulus   !! E [Pa]
     real(wp), intent(in) :: poissons_ratio   !! nu, -1 < nu < 1/2
+    real(wp), intent(in) :: kinematic_modulus, isotropic_modulus, residual_strength   !! [Pa]
 
-    material%shear_modulus = 0.5_wp * youngs_modulus / (1.0_wp + poissons_ratio)
-    material%lambda = youngs_modulus * poissons_ratio &
-      / ((1.0_wp + poissons_ratio) * (1.0_wp - 2.0_wp * poissons_ratio))
+    law%elastic_t = new_elastic(youngs_modulus, poissons_ratio)
+    law%plastic_strain = alpha
+    law%kinematic_modulus = kinematic_modulus
+    law%isotropic_modulus = isotropic_modulus
+    law%residual_strength = residual_strength
   end function new_j2
 
-  !> S = lambda tr(E) I + 2 G E.
-  pure function elastic_stress(material, strain) result(stress)
-    type(j2_t), intent(in) :: material
-    real(wp),   intent(in) :: strain(4)
-    real(wp) :: stress(4)                    !! [Pa]
-    real(wp) :: pressure_part
+  !> What a point remembers.
+  pure function remembers() result(columns)
+    type(label_t), allocatable :: columns(:)
+    character(2), parameter :: ends(4) = ['xx', 'yy', 'zz', 'xy']
+    integer :: c
 
-    pressure_part = material%lambda * (strain(1) + strain(2) + strain(3))
-    stress = 2.0_wp * material%shear_modulus * strain
-    stress(1:3) = stress(1:3) + pressure_part
-  end function elastic_stress
-
-  !> The same for n points.
-  pure subroutine elastic_stress_block(material, n, strain, stress)
-    type(j2_t), intent(in) :: material
-    integer,    intent(in) :: n
-    real(wp),   intent(in),    contiguous :: strain(:, :)   !! (n,4)
-    real(wp),   intent(inout), contiguous :: stress(:, :)   !! (n,4) [Pa]
-    real(wp) :: g2, lambda, pressure_part
-    integer  :: i
-
-    g2 = 2.0_wp * material%shear_modulus
-    lambda = material%lambda
-    !$omp simd simdlen(8) private(pressure_part)
-    do i = 1, n
-      pressure_part = lambda * (strain(i, 1) + strain(i, 2) + strain(i, 3))
-      stress(i, 1) = g2 * strain(i, 1) + pressure_part
-      stress(i, 2) = g2 * strain(i, 2) + pressure_part
-      stress(i, 3) = g2 * strain(i, 3) + pressure_part
-      stress(i, 4) = g2 * strain(i, 4)
+    allocate (columns(alpha))
+    do c = 1, 4
+      columns(plastic_strain + c) = label_t('plastic_strain_'//ends(c), '1', &
+        'plastic strain '//ends(c))
+      columns(back_stress + c) = label_t('back_stress_'//ends(c), 'Pa', &
+        'back stress '//ends(c))
     end do
-  end subroutine elastic_stress_block
+    columns(alpha) = label_t('equivalent_plastic_strain', '1', &
+      'equivalent plastic strain, accumulated')
+  end function remembers
 
-  !> Stored elastic energy per volume, (1/2) E^e : C : E^e, of a stress.
-  pure real(wp) function elastic_energy(material, stress) result(energy)
-    type(j2_t), intent(in) :: material
-    real(wp),   intent(in) :: stress(4)      !! [Pa]
-    real(wp) :: trace
+  !> The same law with its residual strength divided by a factor.
+  pure function reduced(self, factor) result(law)
+    class(j2_t), intent(in) :: self
+    real(wp),    intent(in) :: factor
+    class(law_t), allocatable :: law
+    type(j2_t) :: weaker
 
-    trace = stress(1) + stress(2) + stress(3)
-    energy = (inner(stress, stress) - trace**2 * material%lambda &
-      / (3.0_wp * material%lambda + 2.0_wp * material%shear_modulus)) &
-      / (4.0_wp * material%shear_modulus)
-  end function elastic_energy
-
-  !> The same for points lo to hi.
-  pure subroutine elastic_energy_block(material, lo, hi, stress, energy)
-    type(j2_t), intent(in) :: material
-    integer,    intent(in) :: lo, hi
-    real(wp),   intent(in),    contiguous :: stress(:, :)   !! S (n,4) [Pa]
-    real(wp),   intent(inout), contiguous :: energy(:)      !! [J/m^3]; row 1 is point lo
-    real(wp) :: over_4g, share, trace
-    integer  :: i
-
-    over_4g = 0.25_wp / material%shear_modulus
-    share = material%lambda / (3.0_wp * material%lambda + 2.0_wp * material%shear_modulus)
-    !$omp simd simdlen(8) private(trace)
-    do i = lo, hi
-      trace = stress(i, 1) + stress(i, 2) + stress(i, 3)
-      energy(i - lo + 1) = over_4g * (stress(i, 1)**2 + stress(i, 2)**2 + stress(i, 3)**2 &
-        + 2.0_wp * stress(i, 4)**2 - share * trace**2)
-    end do
-  end subroutine elastic_energy_block
-
-  !> Stress at a strain, and the history n -> n+1.
-  pure subroutine radial_return(material, yield_stress, strain, history, stress)
-    type(j2_t), intent(in)            :: material
-    real(wp),   intent(in)            :: yield_stress  !! sigma_y0 of this point [Pa]
-    real(wp),   intent(in)            :: strain(4)     !! E
-    type(j2_history_t), intent(inout) :: history
-    real(wp),   intent(out)           :: stress(4)     !! S [Pa]
-    type(yielding_t) :: point
-    real(wp) :: strength
-
-    stress = elastic_stress(material, strain - history%plastic_strain)
-    if (.not. material%plastic) return
-    strength = strength_now(material, yield_stress, history%alpha)
-    if (root_3_2 * norm(deviator(stress) - history%back_stress) <= strength) return
-    point%yield_stress(1) = yield_stress
-    point%stress(1, :) = stress
-    point%plastic_strain(1, :) = history%plastic_strain
-    point%back_stress(1, :) = history%back_stress
-    point%alpha(1) = history%alpha
-    call return_to_surface(material, 1, point)
-    stress = point%stress(1, :)
-    history = j2_history_t(point%plastic_strain(1, :), point%back_stress(1, :), point%alpha(1))
-  end subroutine radial_return
+    weaker%elastic_t = self%elastic_t
+    weaker%kinematic_modulus = self%kinematic_modulus
+    weaker%isotropic_modulus = self%isotropic_modulus
+    weaker%residual_strength = self%residual_strength / factor
+    allocate (law, source=weaker)
+  end function reduced
 
   !> Return the trial stresses of n yielding points to the yield surface.
   !>
@@ -152,7 +97,7 @@ contains
   !> Errors: none: every trial state has exactly one answer (3 G + H_k + H_i > 0, and with two
   !> negative moduli 3 G + H_i + min(H_k, H_i) > 0).
   pure subroutine return_to_surface(material, n, points)
-    type(j2_t),       intent(in)    :: material
+    class(j2_t),       intent(in)    :: material
     integer,          intent(in)    :: n
     type(yielding_t), intent(inout) :: points
     real(wp) :: flow(n_block, 4)   !! direction of the flow, of length 1
@@ -182,7 +127,7 @@ contains
 
   !> Whether both moduli are negative.
   pure logical function both_soften(material)
-    type(j2_t), intent(in) :: material
+    class(j2_t), intent(in) :: material
 
     both_soften = material%kinematic_modulus < 0.0_wp .and. material%isotropic_modulus < 0.0_wp
   end function both_soften
@@ -225,7 +170,7 @@ contains
   !> (h^2 - k^2) da^2 - 2 (h b . n - r k) da - (r^2 - b . b) = 0, in the form that does not cancel.
   !> Written without a branch: every quotient is finite, also where it is not used.
   pure subroutine increments(material, n, points, q, flow, first, da)
-    type(j2_t),       intent(in)  :: material
+    class(j2_t),       intent(in)  :: material
     integer,          intent(in)  :: n
     type(yielding_t), intent(in)  :: points
     real(wp),         intent(in)  :: q(n_block), flow(n_block, 4)
@@ -281,7 +226,7 @@ contains
 
   !> beta <- beta + sqrt(2/3) H_k da n: `first` where kinematic softening ends, else all of da.
   pure subroutine move_back_stress(material, n, flow, first, da, points)
-    type(j2_t),       intent(in)    :: material
+    class(j2_t),       intent(in)    :: material
     integer,          intent(in)    :: n
     real(wp),         intent(in)    :: flow(n_block, 4), first(n_block), da(n_block)
     type(yielding_t), intent(inout) :: points
@@ -302,7 +247,7 @@ contains
 
   !> alpha <- alpha + da, S on the yield surface, E^p by the stress that was taken back.
   pure subroutine update_points(material, n, flow, deviator_trial, da, points)
-    type(j2_t),       intent(in)    :: material
+    class(j2_t),       intent(in)    :: material
     integer,          intent(in)    :: n
     real(wp),         intent(in)    :: flow(n_block, 4), deviator_trial(n_block, 4), da(n_block)
     type(yielding_t), intent(inout) :: points
@@ -328,137 +273,136 @@ contains
     end do
   end subroutine update_points
 
-  !> Stresses of points lo to hi; the history goes from step n to n+1.
+  !> Stress of rows lo to hi; the history goes from step n to n+1.
   !>
   !> The trial state of all points comes first; then those that yield are gathered, returned
   !> together, and put back: no loop over points has a branch in it.
-  !> `dissipated`: work of S on dE^p of this step by the trapezoidal rule.
-  pure subroutine stress_block(material, lo, hi, yield_stress, volume, strain, state, dissipated)
-    type(j2_t),    intent(in)    :: material
-    integer,       intent(in)    :: lo, hi
-    real(wp),      intent(in),    contiguous :: yield_stress(:)  !! (n) [Pa]
-    real(wp),      intent(in),    contiguous :: volume(:)        !! V (n) [m^2]
-    real(wp),      intent(in),    contiguous :: strain(:, :)     !! E xx yy zz xy; row 1: point lo
-    type(state_t), intent(inout) :: state
-    real(wp),      intent(out)   :: dissipated                   !! [J/m]
-    type(yielding_t) :: points
+  !> What is dissipated is the work of S on dE^p of this step by the trapezoidal rule.
+  pure subroutine stress_block(self, first, lo, hi, strain, points, flow)
+    class(j2_t), intent(in) :: self
+    integer,     intent(in) :: first, lo, hi
+    real(wp),    intent(in), contiguous :: strain(:, :)   !! E xx yy zz xy; row 1: row `first`
+    type(law_points_t), intent(inout) :: points
+    type(flow_t), intent(inout) :: flow
+    type(yielding_t) :: yielding
     real(wp) :: trial(n_block, 4), excess(n_block)
-    integer  :: places(n_block), n, b
+    integer  :: n, i
 
-    call trial_block(material, lo, hi, yield_stress, strain, state%plastic_strain, &
-      state%back_stress, state%alpha, trial, excess)
-    dissipated = 0.0_wp
+    call trial_block(self, first, lo, hi, strain, points, trial, excess)
     n = 0
-    if (material%plastic) then
-      do b = 1, hi - lo + 1
-        if (excess(b) <= 0.0_wp) cycle
-        n = n + 1
-        places(n) = b
-      end do
-    end if
+    do i = lo, hi
+      if (excess(i - first + 1) <= 0.0_wp) cycle
+      n = n + 1
+      flow%rows(n) = i
+    end do
+    flow%n = n
     if (n > 0) then
-      call gather_points(n, lo, places, yield_stress, trial, state, points)
-      call return_to_surface(material, n, points)
-      call scatter_points(n, lo, places, volume, points, trial, state, dissipated)
+      call gather_points(n, first, flow%rows, trial, points, yielding)
+      call return_to_surface(self, n, yielding)
+      call scatter_points(n, first, flow%rows, yielding, trial, points, flow%dissipated)
     end if
-    state%stress(lo:hi, :) = trial(:hi - lo + 1, :)
+    points%stress(lo:hi, :) = trial(lo - first + 1:hi - first + 1, :)
   end subroutine stress_block
 
   !> The yielding points, one behind the other.
-  pure subroutine gather_points(n, lo, places, yield_stress, trial, state, points)
-    integer,          intent(in)  :: n, lo, places(n_block)   !! place 1: point lo
-    real(wp),         intent(in), contiguous :: yield_stress(:)
-    real(wp),         intent(in)  :: trial(n_block, 4)
-    type(state_t),    intent(in)  :: state
-    type(yielding_t), intent(out) :: points
+  pure subroutine gather_points(n, first, rows, trial, points, yielding)
+    integer,            intent(in)  :: n, first, rows(n_block)
+    real(wp),           intent(in)  :: trial(n_block, 4)
+    type(law_points_t), intent(in)  :: points
+    type(yielding_t),   intent(out) :: yielding
     integer :: k, c
 
-    do k = 1, n
-      points%yield_stress(k) = yield_stress(lo + places(k) - 1)
-      points%alpha(k) = state%alpha(lo + places(k) - 1)
-    end do
-    do c = 1, 4
+    associate (history => points%history)
       do k = 1, n
-        points%stress(k, c) = trial(places(k), c)
-        points%plastic_strain(k, c) = state%plastic_strain(lo + places(k) - 1, c)
-        points%back_stress(k, c) = state%back_stress(lo + places(k) - 1, c)
+        yielding%yield_stress(k) = points%strength(rows(k))
+        yielding%alpha(k) = history(rows(k), alpha)
       end do
-    end do
+      do c = 1, 4
+        do k = 1, n
+          yielding%stress(k, c) = trial(rows(k) - first + 1, c)
+          yielding%plastic_strain(k, c) = history(rows(k), plastic_strain + c)
+          yielding%back_stress(k, c) = history(rows(k), back_stress + c)
+        end do
+      end do
+    end associate
   end subroutine gather_points
 
-  !> Put the returned points back, and add up what they dissipated.
-  pure subroutine scatter_points(n, lo, places, volume, points, trial, state, dissipated)
-    integer,          intent(in)    :: n, lo, places(n_block)   !! place 1: point lo
-    real(wp),         intent(in),    contiguous :: volume(:)
-    type(yielding_t), intent(in)    :: points
-    real(wp),         intent(inout) :: trial(n_block, 4)
-    type(state_t),    intent(inout) :: state
-    real(wp),         intent(out)   :: dissipated               !! [J/m]
+  !> Put the returned points back, and tell what they dissipated.
+  pure subroutine scatter_points(n, first, rows, yielding, trial, points, dissipated)
+    integer,            intent(in)    :: n, first, rows(n_block)
+    type(yielding_t),   intent(in)    :: yielding
+    real(wp),           intent(inout) :: trial(n_block, 4)
+    type(law_points_t), intent(inout) :: points
+    real(wp),           intent(inout) :: dissipated(n_block)   !! out: (n) [J/m^3]
     real(wp), parameter :: twice(4) = [1.0_wp, 1.0_wp, 1.0_wp, 2.0_wp]
     integer :: i, k, c
 
-    dissipated = 0.0_wp
-    do c = 1, 4
-      do k = 1, n
-        i = lo + places(k) - 1
-        dissipated = dissipated + 0.5_wp * twice(c) * volume(i) &
-          * (state%stress(i, c) + points%stress(k, c)) &
-          * (points%plastic_strain(k, c) - state%plastic_strain(i, c))
-        trial(places(k), c) = points%stress(k, c)
-        state%plastic_strain(i, c) = points%plastic_strain(k, c)
-        state%back_stress(i, c) = points%back_stress(k, c)
+    dissipated(:n) = 0.0_wp
+    associate (history => points%history)
+      do c = 1, 4
+        do k = 1, n
+          i = rows(k)
+          dissipated(k) = dissipated(k) + 0.5_wp * twice(c) &
+            * (points%stress(i, c) + yielding%stress(k, c)) &
+            * (yielding%plastic_strain(k, c) - history(i, plastic_strain + c))
+          trial(i - first + 1, c) = yielding%stress(k, c)
+          history(i, plastic_strain + c) = yielding%plastic_strain(k, c)
+          history(i, back_stress + c) = yielding%back_stress(k, c)
+        end do
       end do
-    end do
-    do k = 1, n
-      state%alpha(lo + places(k) - 1) = points%alpha(k)
-    end do
+      do k = 1, n
+        history(rows(k), alpha) = yielding%alpha(k)
+      end do
+    end associate
   end subroutine scatter_points
 
-  !> Trial stress of points lo to hi, and by how much 3/2 |eta*|^2 exceeds sigma_y^2.
-  pure subroutine trial_block(material, lo, hi, yield_stress, strain, plastic_strain, &
-    back_stress, alpha, trial, excess)
-    type(j2_t), intent(in) :: material
-    integer,    intent(in) :: lo, hi
-    real(wp),   intent(in), contiguous :: yield_stress(:), strain(:, :)
-    real(wp),   intent(in), contiguous :: plastic_strain(:, :), back_stress(:, :), alpha(:)
-    real(wp),   intent(out) :: trial(n_block, 4)   !! S* xx yy zz xy [Pa]; row 1: point lo
+  !> Trial stress of rows lo to hi, and by how much 3/2 |eta*|^2 exceeds sigma_y^2.
+  pure subroutine trial_block(law, first, lo, hi, strain, points, trial, excess)
+    class(j2_t), intent(in) :: law
+    integer,    intent(in) :: first, lo, hi
+    real(wp),   intent(in), contiguous :: strain(:, :)
+    type(law_points_t), intent(in) :: points
+    real(wp),   intent(out) :: trial(n_block, 4)   !! S* xx yy zz xy [Pa]; row 1: row `first`
     real(wp),   intent(out) :: excess(n_block)     !! [Pa^2]
-    real(wp) :: g2, lambda, floor_strength, volumetric, exx, eyy, ezz, exy, mean, strength
+    real(wp) :: g2, lambda, hi_modulus, floor_strength, volumetric, exx, eyy, ezz, exy, mean, strength
     real(wp) :: etaxx, etayy, etazz, etaxy
     integer  :: i, b
 
-    g2 = 2.0_wp * material%shear_modulus
-    lambda = material%lambda
+    g2 = 2.0_wp * law%shear_modulus
+    lambda = law%lambda
+    hi_modulus = law%isotropic_modulus
     floor_strength = 0.0_wp
-    if (material%isotropic_modulus < 0.0_wp) floor_strength = material%residual_strength
-    !$omp simd simdlen(8) private(b, volumetric, exx, eyy, ezz, exy, mean, strength) &
-    !$omp private(etaxx, etayy, etazz, etaxy)
-    do i = lo, hi
-      b = i - lo + 1
-      exx = strain(b, 1) - plastic_strain(i, 1)
-      eyy = strain(b, 2) - plastic_strain(i, 2)
-      ezz = strain(b, 3) - plastic_strain(i, 3)
-      exy = strain(b, 4) - plastic_strain(i, 4)
-      volumetric = exx + eyy + ezz
-      trial(b, 1) = g2 * exx + lambda * volumetric
-      trial(b, 2) = g2 * eyy + lambda * volumetric
-      trial(b, 3) = g2 * ezz + lambda * volumetric
-      trial(b, 4) = g2 * exy
-      mean = volumetric / 3.0_wp
-      etaxx = g2 * (exx - mean) - back_stress(i, 1)
-      etayy = g2 * (eyy - mean) - back_stress(i, 2)
-      etazz = g2 * (ezz - mean) - back_stress(i, 3)
-      etaxy = g2 * exy - back_stress(i, 4)
-      strength = max(min(floor_strength, yield_stress(i)), &
-        yield_stress(i) + material%isotropic_modulus * alpha(i))
-      excess(b) = 1.5_wp * (etaxx**2 + etayy**2 + etazz**2 + 2.0_wp * etaxy**2) - strength**2
-    end do
+    if (law%isotropic_modulus < 0.0_wp) floor_strength = law%residual_strength
+    associate (history => points%history, yield_stress => points%strength)
+      !$omp simd simdlen(8) private(b, volumetric, exx, eyy, ezz, exy, mean, strength) &
+      !$omp private(etaxx, etayy, etazz, etaxy)
+      do i = lo, hi
+        b = i - first + 1
+        exx = strain(b, 1) - history(i, 1)
+        eyy = strain(b, 2) - history(i, 2)
+        ezz = strain(b, 3) - history(i, 3)
+        exy = strain(b, 4) - history(i, 4)
+        volumetric = exx + eyy + ezz
+        trial(b, 1) = g2 * exx + lambda * volumetric
+        trial(b, 2) = g2 * eyy + lambda * volumetric
+        trial(b, 3) = g2 * ezz + lambda * volumetric
+        trial(b, 4) = g2 * exy
+        mean = volumetric / 3.0_wp
+        etaxx = g2 * (exx - mean) - history(i, 5)
+        etayy = g2 * (eyy - mean) - history(i, 6)
+        etazz = g2 * (ezz - mean) - history(i, 7)
+        etaxy = g2 * exy - history(i, 8)
+        strength = max(min(floor_strength, yield_stress(i)), &
+          yield_stress(i) + hi_modulus * history(i, 9))
+        excess(b) = 1.5_wp * (etaxx**2 + etayy**2 + etazz**2 + 2.0_wp * etaxy**2) - strength**2
+      end do
+    end associate
   end subroutine trial_block
 
   !> sigma_y(alpha): isotropic softening ends at the residual strength, hardening has no end. A
   !> point that is weaker than that from the start does not soften.
   pure real(wp) function strength_now(material, yield_stress, alpha) result(strength)
-    type(j2_t), intent(in) :: material
+    class(j2_t), intent(in) :: material
     real(wp),   intent(in) :: yield_stress, alpha
 
     strength = yield_stress + material%isotropic_modulus * alpha
@@ -473,7 +417,7 @@ contains
   !> da2 solves |e + (k da2 / R) b| - 3 G da2 = sigma_y1 - k da2, a quadratic. When nothing is left
   !> of b the strength is the residual one and da3 is the rest.
   pure subroutine shrink_to_residual(material, q, strength, residual, n, beta, da)
-    type(j2_t), intent(in)    :: material
+    class(j2_t), intent(in)    :: material
     real(wp),   intent(in)    :: q         !! |e| = q* - (3 G + H_k) da1 [Pa]
     real(wp),   intent(in)    :: strength  !! sigma_y1 = sigma_y(alpha + da1) [Pa]
     real(wp),   intent(in)    :: residual  !! sigma_r, at most sigma_y0 [Pa]
@@ -512,35 +456,5 @@ contains
       beta = beta * (1.0_wp - k * da / r)
     end if
   end subroutine shrink_to_residual
-
-  !> Deviatoric part.
-  pure function deviator(tensor) result(s)
-    real(wp), intent(in) :: tensor(4)
-    real(wp) :: s(4)
-
-    s = tensor
-    s(1:3) = s(1:3) - (tensor(1) + tensor(2) + tensor(3)) / 3.0_wp
-  end function deviator
-
-  !> a : b of two symmetric tensors.
-  pure real(wp) function inner(a, b)
-    real(wp), intent(in) :: a(4), b(4)
-
-    inner = a(1) * b(1) + a(2) * b(2) + a(3) * b(3) + 2.0_wp * a(4) * b(4)
-  end function inner
-
-  !> |a|.
-  pure real(wp) function norm(a)
-    real(wp), intent(in) :: a(4)
-
-    norm = sqrt(inner(a, a))
-  end function norm
-
-  !> sqrt(3/2)|dev stress|.
-  pure real(wp) function von_mises(stress)
-    real(wp), intent(in) :: stress(4)
-
-    von_mises = root_3_2 * norm(deviator(stress))
-  end function von_mises
 
 end module pd_j2

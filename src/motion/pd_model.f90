@@ -1,47 +1,45 @@
 !> The model: everything about a run that does not change while it runs.
 module pd_model
+  use pd_blocks, only: blocks_t
   use pd_boundary, only: boundary_t, move, platens_t, reference_ends
-  use pd_force, only: solid_t
   use pd_geometry, only: body_t
   use pd_kinds, only: wp
   use pd_loads, only: apply_loads
+  use pd_materials, only: materials_t
   use pd_operators, only: operators_t
+  use pd_points, only: points_t
   use pd_pressure, only: pressure_t
-  use pd_stability, only: highest_frequency
   use pd_state, only: state_t
-  use pd_verlet, only: frame_t, motion_t, reference_velocity
   implicit none
   private
 
-  public :: model_t, start, damping_frame, find_highest_frequency
+  public :: model_t, frame_t, start, damping_frame
 
   !> Everything about a run that does not change while it runs, and the boundaries with the forces
   !> of the present step.
   type :: model_t
     type(body_t)      :: body
     class(operators_t), allocatable :: operators
-    type(solid_t)     :: solid
-    type(motion_t)    :: motion
+    type(materials_t) :: materials
+    type(blocks_t)    :: blocks              !! of the rows of all fields
+    type(points_t)    :: points
     type(platens_t)   :: platens
     type(boundary_t), allocatable :: boundaries(:)
     type(pressure_t), allocatable :: pressures(:)
-    real(wp), allocatable :: free(:, :)      !! 1: free, 0: prescribed component (n,2)
+    real(wp), allocatable :: strength(:)     !! initial strength of the points (n) [Pa]
     real(wp) :: spacing = 0.0_wp             !! dx [m]
     real(wp) :: delta = 0.0_wp               !! horizon [m]
+    real(wp) :: damping = 0.0_wp             !! C [kg/(m^3 s)]
     logical  :: damped_in_frame = .false.    !! damping acts in the frame of the platens
     real(wp) :: highest_frequency = 0.0_wp   !! of the linearised operator [1/s]; 0: not asked for
   end type model_t
 
+  !> Velocity against which the damping acts: linear between two ends, constant beyond them.
+  type :: frame_t
+    real(wp) :: lower(2) = 0.0_wp, upper(2) = 0.0_wp   !! [m/s]
+  end type frame_t
+
 contains
-
-  !> Highest frequency of the model, unless it is known already.
-  subroutine find_highest_frequency(model)
-    type(model_t), intent(inout) :: model
-    integer :: iterations
-
-    if (model%highest_frequency <= 0.0_wp) call highest_frequency(model%operators, model%solid, &
-      model%body%volume, model%free, model%highest_frequency, iterations)
-  end subroutine find_highest_frequency
 
   !> Velocity at both ends of the frame in which the damping acts, at time t.
   pure type(frame_t) function damping_frame(model, t) result(frame)
@@ -55,22 +53,21 @@ contains
   !> State at t = 0: undeformed, moving with the frame of the damping, boundaries with theirs; loads
   !> without a ramp act already.
   subroutine start(model, state)
-    type(model_t), intent(in)  :: model
-    type(state_t), intent(out) :: state
+    type(model_t), intent(inout) :: model
+    type(state_t), intent(out)   :: state
     type(frame_t) :: frame
     integer :: k
 
-    call state%allocate(model%body%n)
+    call state%allocate(size(model%points%volume), model%materials%remembered())
+    state%strength = model%strength
     frame = damping_frame(model, 0.0_wp)
     do k = 1, 2
-      state%velocity(:, k) = reference_velocity(model%motion, frame, k, &
-        model%body%position(:, model%motion%axis))
+      state%velocity(:, k) = frame%lower(k) + (frame%upper(k) - frame%lower(k)) * model%points%place
+      where (model%points%volume <= 0.0_wp) state%velocity(:, k) = 0.0_wp
     end do
-    do k = 1, 2
-      where (model%body%boundary < 0) state%velocity(:, k) = 0.0_wp
-    end do
-    call move(model%boundaries, model%body%position, 0.0_wp, state%displacement, state%velocity)
-    call apply_loads(model%pressures, model%boundaries, model%body%volume, 0.0_wp, state%force)
+    call move(model%boundaries, model%points%position, 0.0_wp, state%displacement, state%velocity)
+    call apply_loads(model%pressures, model%boundaries, model%points%volume, 0.0_wp, state%force)
+    call model%operators%take_in(state%displacement)
   end subroutine start
 
 end module pd_model

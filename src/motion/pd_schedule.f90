@@ -11,10 +11,10 @@ module pd_schedule
   public :: schedule_t, new_schedule, row_due, rows_due, step_at
 
   type :: schedule_t
-    real(wp) :: time_step = 0.0_wp           !! dt [s]
     real(wp) :: end_time = 0.0_wp            !! asked for [s]
     integer  :: steps = 0                    !! of the whole run
     integer  :: rows = 1                     !! of the history
+    real(wp) :: rows_per_step = 1.0_wp
     integer, allocatable :: frame_steps(:)   !! ascending, without the unloaded state
   end type schedule_t
 
@@ -42,9 +42,9 @@ contains
     integer :: k
 
     allocate (schedule%frame_steps(size(frame_times)), source=0)
-    schedule%time_step = time_step
     schedule%end_time = end_time
     schedule%rows = rows
+    schedule%rows_per_step = real(rows, wp) * time_step / end_time
     if (end_time / time_step > 0.9_wp * real(huge(1), wp)) then
       write (text, '(es10.3)') end_time / time_step
       call errors%add('the run has too many steps', '&integration', trim(adjustl(text)), &
@@ -62,12 +62,10 @@ contains
     type(schedule_t), intent(in) :: schedule
     integer,          intent(in) :: step
     real(wp), parameter :: round_off = 1.0e-9_wp
-    real(wp) :: rows_a_step
 
-    rows_a_step = real(schedule%rows, wp) * schedule%time_step / schedule%end_time
     row_due = step == schedule%steps .or. &
-      floor(real(step, wp) * rows_a_step + round_off) &
-      > floor(real(step - 1, wp) * rows_a_step + round_off)
+      floor(real(step, wp) * schedule%rows_per_step + round_off) &
+      > floor(real(step - 1, wp) * schedule%rows_per_step + round_off)
   end function row_due
 
   !> How many rows of the history are due after a step that is done.

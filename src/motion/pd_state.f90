@@ -2,24 +2,25 @@
 !>
 !> `visit` is the table of its fields: whatever is done with all of them is a visitor.
 module pd_state
+  use pd_blocks, only: blocks_t
   use pd_fields, only: allocating_t, counting_t, field_visitor_t, gathering_t, scattering_t, &
     state_field_t
-  use pd_kinds, only: n_block, wp
+  use pd_kinds, only: wp
+  use pd_labels, only: label_t
+  use pd_law, only: law_points_t
   implicit none
   private
 
   public :: state_t, block_work_t
 
-  !> Fields over all n points, fictitious ones included.
-  type :: state_t
-    real(wp), allocatable :: displacement(:, :)          !! u (n,2) [m]
-    real(wp), allocatable :: velocity(:, :)              !! v (n,2) [m/s]
-    real(wp), allocatable :: force(:, :)                 !! internal force density f (n,2) [N/m^3]
-    real(wp), allocatable :: deformation_gradient(:, :)  !! F (n,4) xx xy yx yy
-    real(wp), allocatable :: stress(:, :)                !! S (n,4) xx yy zz xy [Pa]
-    real(wp), allocatable :: plastic_strain(:, :)        !! E^p (n,4) xx yy zz xy
-    real(wp), allocatable :: back_stress(:, :)           !! beta (n,4) xx yy zz xy [Pa]
-    real(wp), allocatable :: alpha(:)                    !! equivalent plastic strain (n)
+  !> Fields over all rows, fictitious points included; stress, history and strength belong to the
+  !> laws.
+  type, extends(law_points_t) :: state_t
+    real(wp), allocatable :: displacement(:, :)            !! u (n,2) [m]
+    real(wp), allocatable :: velocity(:, :)                !! v (n,2) [m/s]
+    real(wp), allocatable :: force(:, :)                   !! force density f (n,2) [N/m^3]
+    real(wp), allocatable :: displacement_gradient(:, :)   !! H = F - I (n,4) xx xy yx yy
+    type(label_t), allocatable :: remembered(:)            !! columns of the history
   contains
     procedure :: visit
     procedure :: allocate => allocate_state
@@ -41,20 +42,18 @@ module pd_state
 
 contains
 
-  !> Make room for the blocks of points first to last.
-  subroutine fit(self, first, last)
+  !> Make room for some blocks.
+  subroutine fit(self, blocks)
     class(block_work_t), intent(inout) :: self
-    integer,             intent(in)    :: first, last
-    integer :: n_blocks
+    type(blocks_t),      intent(in)    :: blocks
 
-    n_blocks = (last - first) / n_block + 1
     if (allocated(self%failed)) then
-      if (size(self%failed) == n_blocks) return
+      if (size(self%failed) == blocks%count) return
       deallocate (self%damping, self%dissipated, self%failed, self%times)
     end if
-    allocate (self%damping(4, n_blocks), self%dissipated(n_blocks), self%times(3, n_blocks), &
-      source=0.0_wp)
-    allocate (self%failed(n_blocks), source=0)
+    allocate (self%damping(4, blocks%count), self%dissipated(blocks%count), &
+      self%times(3, blocks%count), source=0.0_wp)
+    allocate (self%failed(blocks%count), source=0)
   end subroutine fit
 
   !> Show all fields to a visitor.
@@ -68,28 +67,29 @@ contains
     call visitor%field(state_field_t('velocity', 'm/s', 'velocity v', 'x y'), self%velocity)
     call visitor%field(state_field_t('force', 'N/m^3', 'force density f, loads and control '// &
       'included', 'x y'), self%force)
-    call visitor%field(state_field_t('deformation_gradient', '1', 'deformation gradient F', &
-      'xx xy yx yy', rest=[1.0_wp, 0.0_wp, 0.0_wp, 1.0_wp]), self%deformation_gradient)
-    call visitor%field(state_field_t('stress', 'Pa', 'second Piola-Kirchhoff stress S', tensor), &
+    call visitor%field(state_field_t('displacement_gradient', '1', 'H = F - I', 'xx xy yx yy'), &
+      self%displacement_gradient)
+    call visitor%field(state_field_t('stress', 'Pa', 'stress conjugate to the strain', tensor), &
       self%stress)
-    call visitor%field(state_field_t('plastic_strain', '1', 'plastic strain E^p', tensor), &
-      self%plastic_strain)
-    call visitor%field(state_field_t('back_stress', 'Pa', 'back stress beta', tensor), &
-      self%back_stress)
-    call visitor%field(state_field_t('alpha', '1', 'equivalent plastic strain alpha'), self%alpha)
+    call visitor%field(state_field_t('strength', 'Pa', 'initial strength', '', &
+      kept=.false.), self%strength)
+    call visitor%field(state_field_t('history', '', 'what the laws remember', '', &
+      columns=self%remembered), self%history)
   end subroutine visit
 
-  !> The unloaded state of n points.
-  subroutine allocate_state(self, n)
+  !> The unloaded state of n rows.
+  subroutine allocate_state(self, n, remembered)
     class(state_t), intent(inout) :: self
     integer,        intent(in)    :: n
+    type(label_t),  intent(in)    :: remembered(:)   !! columns of the history
     type(allocating_t) :: room
 
+    self%remembered = remembered
     room%n = n
     call self%visit(room)
   end subroutine allocate_state
 
-  !> Reduce the fields that a restart needs to some places, in their order, and give up the others.
+  !> Reduce the fields that a restart needs to some rows, in their order, and give up the others.
   subroutine gather(self, places)
     class(state_t), intent(inout) :: self
     integer,        intent(in)    :: places(:)
@@ -99,7 +99,7 @@ contains
     call self%visit(choice)
   end subroutine gather
 
-  !> The state of n places from that of some of them; the others are unloaded and at rest.
+  !> The state of n rows from that of some of them; the others are unloaded and at rest.
   subroutine scatter(self, places, n)
     class(state_t), intent(inout) :: self
     integer,        intent(in)    :: places(:), n

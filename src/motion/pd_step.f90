@@ -1,17 +1,17 @@
-!> One step of the motion, and where its time goes.
+!> One step of velocity Verlet, and where its time goes.
 !>
-!> u gives F, F gives S and A, A gives f, f gives v.
 !> Source: doc/theory.md, section 6.
 module pd_step
-  use pd_boundary, only: boundary_forces, motion_work, move
-  use pd_force, only: force_state, internal_force
+  use pd_boundary, only: motion_work, move
+  use pd_clock, only: clock_t
+  use pd_forces, only: forces
   use pd_kinds, only: wp
-  use pd_loads, only: apply_loads, load_work
-  use pd_observe, only: ledger_t
+  use pd_ledger, only: ledger_t
+  use pd_loads, only: load_work
   use pd_model, only: damping_frame, model_t
   use pd_state, only: block_work_t, state_t
-  use pd_timing, only: timing_t
-  use pd_verlet, only: kick, kick_and_drift, kick_twice_and_drift
+  use pd_timing, only: kernel_boundaries, kernel_motion, timing_t
+  use pd_verlet, only: kicks_t, move_points
   implicit none
   private
 
@@ -19,78 +19,62 @@ module pd_step
 
   !> Work space of the steps, and what one of them leaves to the next.
   type :: step_work_t
-    real(wp), allocatable :: a(:, :)           !! A (n,4) [N/m^6]; voids: 0
-    type(block_work_t)    :: blocks
+    type(block_work_t), private :: blocks
     !> v is v^{n+1/2}: the second half kick of the last step comes together with the first one of
-    !> the next, which saves a way through the memory. These are entered into the ledger then.
-    logical,  private :: open = .false.
-    real(wp), private :: dissipated = 0.0_wp   !! by plastic flow [J/m]
-    real(wp), private :: first_work(2) = 0.0_wp   !! of the damping in the first half kick [J/m]
-    real(wp), private :: outer_work = 0.0_wp   !! of prescribed motion and loads [J/m]
+    !> the next, which saves a way through the memory.
+    logical, private :: open = .false.
   end type step_work_t
 
 contains
 
-  !> One step of velocity Verlet, to step number `step`: the loads join f, and work on v^{n+1/2}.
+  !> One step, from the time of the clock to the next: the loads join f, and work on v^{n+1/2}.
   !>
   !> `whole`: the state will be looked at; else v and the ledger may be half a kick behind until
   !> the next step. That changes no bit of what is seen.
-  !> `failed_point`: 0, or the first point whose det F is not positive (NaN included).
-  subroutine take_step(step, whole, model, state, work, ledger, timing, failed_point)
-    integer,        intent(in)    :: step
-    logical,        intent(in)    :: whole
-    type(model_t),  intent(inout) :: model          !! its boundaries get their new forces
-    type(state_t),  intent(inout) :: state
-    type(step_work_t), intent(inout) :: work
-    type(ledger_t), intent(inout) :: ledger
-    type(timing_t), intent(inout) :: timing
-    integer,        intent(out)   :: failed_point
-    real(wp) :: t, t_next, loads_work, second_work(2), first_work(2)
-
-    t = real(step - 1, wp) * model%motion%time_step
-    t_next = real(step, wp) * model%motion%time_step
-    call timing%begin(step)
-    associate (x => model%body%position, volume => model%body%volume, free => model%free, &
-      u => state%displacement, v => state%velocity, f => state%force, blocks => work%blocks)
-      if (work%open) then
-        call kick_twice_and_drift(model%motion, damping_frame(model, t), x, volume, free, f, v, &
-          u, blocks, second_work, first_work)
-        call close_step(second_work, work, ledger)
-      else
-        call kick_and_drift(model%motion, damping_frame(model, t), x, volume, free, f, v, u, &
-          blocks, first_work)
-      end if
-      work%first_work = first_work
-      call timing%lap(1)
-      call move(model%boundaries, x, t_next, u, v)
-      loads_work = load_work(model%pressures, model%boundaries, v, t, t_next)
-      call timing%lap(6)
-      call force_state(model%operators, model%solid, volume, state, work%a, blocks, timing, &
-        failed_point)
-      work%dissipated = sum(blocks%dissipated)
-      call internal_force(model%operators, u, work%a, f, blocks, timing)
-      call apply_loads(model%pressures, model%boundaries, volume, t_next, f)
-      call boundary_forces(x, volume, t_next, f, model%boundaries)
-      work%outer_work = motion_work(model%boundaries, t, t_next) + loads_work
-      work%open = .true.
-      call timing%lap(6)
-      if (.not. whole) return
-      call kick(model%motion, damping_frame(model, t_next), x, volume, free, f, v, u, blocks, &
-        second_work)
-      call close_step(second_work, work, ledger)
-      call timing%lap(1)
-    end associate
-  end subroutine take_step
-
-  !> The second half kick is done: enter the step into the ledger.
-  pure subroutine close_step(second_work, work, ledger)
-    real(wp),          intent(in)    :: second_work(2)   !! of the damping in it [J/m]
+  !> `failed_row`: 0, or the first row whose det F is not positive (NaN included).
+  subroutine take_step(clock, whole, model, state, work, ledger, timing, failed_row)
+    type(clock_t),     intent(inout) :: clock
+    logical,           intent(in)    :: whole
+    type(model_t),     intent(inout) :: model          !! its boundaries get their new forces
+    type(state_t),     intent(inout) :: state
     type(step_work_t), intent(inout) :: work
     type(ledger_t),    intent(inout) :: ledger
+    type(timing_t),    intent(inout) :: timing
+    integer,           intent(out)   :: failed_row
+    real(wp) :: t, t_next, loads_work
 
-    call ledger%enter(work%dissipated, work%first_work(1) + second_work(1), &
-      work%first_work(2) + second_work(2) + work%outer_work)
-    work%open = .false.
-  end subroutine close_step
+    t = clock%time()
+    call clock%advance()
+    t_next = clock%time()
+    call timing%begin(clock%step)
+    associate (points => model%points, dt => clock%time_step, blocks => work%blocks)
+      call move_points(kicks_t(second=work%open, first=.true.), model, damping_frame(model, t), &
+        dt, state, blocks)
+      if (work%open) call enter_damping(blocks%damping(1:2, :), ledger)
+      call enter_damping(blocks%damping(3:4, :), ledger)
+      call timing%lap(kernel_motion)
+      call move(model%boundaries, points%position, t_next, state%displacement, state%velocity)
+      loads_work = load_work(model%pressures, model%boundaries, state%velocity, t, t_next)
+      call timing%lap(kernel_boundaries)
+      call forces(model, t_next, state, blocks, timing, failed_row)
+      ledger%plastic = ledger%plastic + blocks%dissipated
+      ledger%outer_work = ledger%outer_work + (motion_work(model%boundaries, t, t_next) + loads_work)
+      work%open = .not. whole
+      if (work%open) return
+      call move_points(kicks_t(second=.true.), model, damping_frame(model, t_next), dt, state, &
+        blocks)
+      call enter_damping(blocks%damping(1:2, :), ledger)
+    end associate
+    call timing%lap(kernel_motion)
+  end subroutine take_step
+
+  !> Enter the work of the damping in half a step.
+  pure subroutine enter_damping(work, ledger)
+    real(wp),       intent(in)    :: work(:, :)   !! dissipated, done by the frame (2,blocks) [J/m]
+    type(ledger_t), intent(inout) :: ledger
+
+    ledger%damping = ledger%damping + work(1, :)
+    ledger%frame_work = ledger%frame_work + work(2, :)
+  end subroutine enter_damping
 
 end module pd_step

@@ -5,10 +5,12 @@
 !> Source: doc/theory.md, sections 2, 4 and 5.
 module pd_bond_list
   use pd_cells, only: cells_t, largest_neighbourhood, sort_into_cells
+  use pd_domain, only: new_domain
   use pd_errors, only: error_list_t
   use pd_families, only: family, horizon_t, influence
   use pd_kinds, only: i8, n_block, wp
   use pd_operators, only: operators_t
+  use pd_storage, only: listed_storage
   implicit none
   private
 
@@ -22,9 +24,9 @@ module pd_bond_list
     real(wp),    allocatable, private :: weight(:)     !! omega V_j (bonds) [m^2]
     real(wp),    allocatable, private :: position(:, :)  !! X (n,2) [m]
   contains
-    procedure :: gradient_block
-    procedure :: divergence_block
-    procedure :: control_block
+    procedure :: gradient_sums_block
+    procedure :: divergence_sums_block
+    procedure :: control_sums_block
     procedure :: shape_tensor
     procedure :: zero_energy_squared
     procedure :: bonds
@@ -49,7 +51,8 @@ contains
 
     n = size(position, 1)
     operators%n = n
-    operators%last_point = n
+    operators%storage = listed_storage(n)
+    operators%domain = new_domain(1, n)
     allocate (operators%position(n, 2), source=position)
     call sort_into_cells(position, horizon%delta, cells)
     most = largest_neighbourhood(cells)
@@ -158,12 +161,12 @@ contains
     end if
   end subroutine report_coincident
 
-  !> G[u] of points lo to hi: h = sum_j omega V_j (u_j - u_i) (x) xi.
-  pure subroutine gradient_block(self, lo, hi, u, h)
+  !> G[u] of points lo to hi: g = sum_j omega V_j (u_j - u_i) (x) xi.
+  pure subroutine gradient_sums_block(self, lo, hi, u, g)
     class(bond_list_t), intent(in)  :: self
     integer,  intent(in) :: lo, hi
     real(wp), intent(in),    contiguous :: u(:, :)   !! (n,2) [m]
-    real(wp), intent(inout), contiguous :: h(:, :)   !! out: (n,4) xx xy yx yy [m^4]
+    real(wp), intent(inout), contiguous :: g(:, :)   !! out: (n,4) xx xy yx yy [m^4]
     integer     :: i, j
     integer(i8) :: b
     real(wp)    :: dx, dy, hxx, hxy, hyx, hyy
@@ -182,15 +185,15 @@ contains
         hyx = hyx + dy * self%wx(b)
         hyy = hyy + dy * self%wy(b)
       end do
-      h(i, 1) = hxx
-      h(i, 2) = hxy
-      h(i, 3) = hyx
-      h(i, 4) = hyy
+      g(i, 1) = hxx
+      g(i, 2) = hxy
+      g(i, 3) = hyx
+      g(i, 4) = hyy
     end do
-  end subroutine gradient_block
+  end subroutine gradient_sums_block
 
   !> D[A] of points lo to hi: f = sum_j omega V_j (A_i + A_j) xi.
-  pure subroutine divergence_block(self, lo, hi, a, f)
+  pure subroutine divergence_sums_block(self, lo, hi, a, f)
     class(bond_list_t), intent(in)  :: self
     integer,  intent(in) :: lo, hi
     real(wp), intent(in),    contiguous :: a(:, :)   !! (n,4) xx xy yx yy [N/m^6]
@@ -210,10 +213,10 @@ contains
       f(i, 1) = fx
       f(i, 2) = fy
     end do
-  end subroutine divergence_block
+  end subroutine divergence_sums_block
 
   !> f <- f + Z[u] for points lo to hi: the bond part of the zero-energy control.
-  pure subroutine control_block(self, lo, hi, u, f)
+  pure subroutine control_sums_block(self, lo, hi, u, f)
     class(bond_list_t), intent(in)    :: self
     integer,  intent(in) :: lo, hi
     real(wp), intent(in),    contiguous :: u(:, :)   !! (n,2) [m]
@@ -234,7 +237,7 @@ contains
       f(i, 1) = f(i, 1) + fx
       f(i, 2) = f(i, 2) + fy
     end do
-  end subroutine control_block
+  end subroutine control_sums_block
 
   !> K = sum_j omega V_j xi (x) xi.
   subroutine shape_tensor(self, k)
@@ -247,7 +250,7 @@ contains
     allocate (h(self%n, 4))
     !$omp parallel do schedule(static) default(none) shared(self, h) private(lo)
     do lo = 1, self%n, n_block
-      call self%gradient_block(lo, min(lo + n_block - 1, self%n), self%position, h)
+      call self%gradient_sums_block(lo, min(lo + n_block - 1, self%n), self%position, h)
     end do
     !$omp end parallel do
     k(:, 1) = h(:, 1)
@@ -255,27 +258,27 @@ contains
     k(:, 3) = h(:, 2)
   end subroutine shape_tensor
 
-  !> Part of the deformation that F does not see, squared and weighted over the family.
-  subroutine zero_energy_squared(self, u, deformation_gradient, z2)
+  !> Part of the deformation that H does not see, squared and weighted over the family.
+  subroutine zero_energy_squared(self, u, h, z2)
     class(bond_list_t), intent(in) :: self
-    real(wp), intent(in),    contiguous :: u(:, :)                     !! (n,2) [m]
-    real(wp), intent(in),    contiguous :: deformation_gradient(:, :)  !! F (n,4) xx xy yx yy
-    real(wp), intent(inout), contiguous :: z2(:)                       !! out: (n) [m^4]
+    real(wp), intent(in),    contiguous :: u(:, :)   !! (n,2) [m]
+    real(wp), intent(in),    contiguous :: h(:, :)   !! H (n,4) xx xy yx yy
+    real(wp), intent(inout), contiguous :: z2(:)     !! out: (n) [m^4]
     integer     :: i, j
     integer(i8) :: b
     real(wp)    :: xi(2), z(2)
 
     !$omp parallel do schedule(static) default(none) private(i, j, b, xi, z) &
-    !$omp shared(self, u, deformation_gradient, z2)
+    !$omp shared(self, u, h, z2)
     do i = 1, self%n
       z2(i) = 0.0_wp
-      associate (f => deformation_gradient, x => self%position)
+      associate (x => self%position)
         do b = self%first(i), self%first(i + 1) - 1
           j = self%neighbour(b)
           xi(1) = x(j, 1) - x(i, 1)
           xi(2) = x(j, 2) - x(i, 2)
-          z(1) = u(j, 1) - u(i, 1) - (f(i, 1) - 1.0_wp) * xi(1) - f(i, 2) * xi(2)
-          z(2) = u(j, 2) - u(i, 2) - f(i, 3) * xi(1) - (f(i, 4) - 1.0_wp) * xi(2)
+          z(1) = u(j, 1) - u(i, 1) - h(i, 1) * xi(1) - h(i, 2) * xi(2)
+          z(2) = u(j, 2) - u(i, 2) - h(i, 3) * xi(1) - h(i, 4) * xi(2)
           z2(i) = z2(i) + self%weight(b) * (z(1)**2 + z(2)**2)
         end do
       end associate

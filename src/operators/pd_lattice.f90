@@ -13,10 +13,13 @@
 !> inner loops: voids carry zero.
 !> Source: doc/theory.md, sections 2, 4 and 5.
 module pd_lattice
+  use pd_blocks, only: blocks_t
   use pd_columns, only: add_sums, columns_t, new_columns
+  use pd_domain, only: new_domain
   use pd_families, only: horizon_t, influence, within_horizon
   use pd_kinds, only: i8, n_block, n_line, wp
   use pd_operators, only: operators_t
+  use pd_storage, only: lattice_storage
   implicit none
   private
 
@@ -34,12 +37,12 @@ module pd_lattice
     real(wp), allocatable, private :: weight(:)           !! omega V_0 (pairs) [m^2]
     real(wp), allocatable, private :: moment(:, :)        !! s (n,2) [m^3]
     real(wp), allocatable, private :: weighed_moment(:, :)   !! s over the share (n,2) [m^3]
-    real(wp), allocatable, private :: held(:)             !! sum_j omega V_j (c_i + c_j) (n) [N/m^4]
+    real(wp), allocatable, private :: stiffness(:)        !! sum_j omega V_j (c_i + c_j) (n) [N/m^4]
   contains
     procedure :: set_control
-    procedure :: gradient_block
-    procedure :: divergence_block
-    procedure :: control_block
+    procedure :: gradient_sums_block
+    procedure :: divergence_sums_block
+    procedure :: control_sums_block
     procedure :: shape_tensor
     procedure :: zero_energy_squared
     procedure :: bonds
@@ -50,16 +53,17 @@ module pd_lattice
 contains
 
   !> Offsets, weights and moments.
-  subroutine new_lattice_operators(horizon, spacing, stride, volume, operators)
+  subroutine new_lattice_operators(horizon, spacing, place, volume, operators)
     type(horizon_t), intent(in) :: horizon
-    real(wp),        intent(in) :: spacing     !! dx [m]
-    integer,         intent(in) :: stride      !! places from a row to the next
-    real(wp),        intent(in) :: volume(:)   !! V (n) [m^2]; voids: 0
+    real(wp),        intent(in) :: spacing       !! dx [m]
+    integer,         intent(in) :: place(:, :)   !! column and row of every point (n,2)
+    real(wp),        intent(in) :: volume(:)     !! V of every point (n) [m^2]
     type(lattice_operators_t), intent(out) :: operators
     integer  :: k, reach, kx, ky, i
     real(wp) :: xi(2), length_squared
 
-    operators%n = size(volume)
+    operators%storage = lattice_storage(horizon, spacing, place)
+    operators%n = operators%storage%rows
     reach = int(horizon%delta / spacing * (1.0_wp + 1.0e-5_wp)) + 1
     allocate (operators%shift((2 * reach + 1)**2), source=0)
     allocate (operators%xi(size(operators%shift), 2), operators%weight(size(operators%shift)), &
@@ -72,7 +76,7 @@ contains
         length_squared = xi(1)**2 + xi(2)**2
         if (.not. within_horizon(horizon, length_squared)) cycle
         k = k + 1
-        operators%shift(k) = kx + ky * stride
+        operators%shift(k) = kx + ky * operators%storage%stride
         operators%xi(k, :) = xi
         operators%weight(k) = influence(horizon, length_squared) * spacing**2
       end do
@@ -81,22 +85,22 @@ contains
     operators%shift = operators%shift(:k)
     operators%xi = operators%xi(:k, :)
     operators%weight = operators%weight(:k)
-    operators%columns = columns_of(horizon, spacing, stride, reach)
+    operators%columns = columns_of(horizon, spacing, operators%storage%stride, reach)
     operators%own_weight = influence(horizon, 0.0_wp) * spacing**2
 
-    allocate (operators%share(operators%n))
-    operators%share = volume / spacing**2
-    operators%weighs = any(abs(operators%share) > 0.0_wp .and. &
-      abs(operators%share - 1.0_wp) > 1.0e-12_wp)
-    if (.not. operators%weighs) operators%share = anint(operators%share)
-    operators%first_point = line_start(findloc(volume > 0.0_wp, .true., dim=1))
-    operators%last_point = findloc(volume > 0.0_wp, .true., dim=1, back=.true.)
+    allocate (operators%share_of(operators%n))
+    operators%share_of = operators%storage%spread(volume) / spacing**2
+    operators%weighs = any(abs(operators%share_of) > 0.0_wp .and. &
+      abs(operators%share_of - 1.0_wp) > 1.0e-12_wp)
+    if (.not. operators%weighs) operators%share_of = anint(operators%share_of)
+    operators%domain = new_domain(line_start(operators%storage%row(1)), &
+      operators%storage%row(operators%storage%n))
     call weigh(operators)
     if (operators%weighs) then
       allocate (operators%weighed_moment(operators%n, 2), source=0.0_wp)
-      do i = operators%first_point, operators%last_point
-        if (operators%share(i) > 0.0_wp) &
-          operators%weighed_moment(i, :) = operators%moment(i, :) / operators%share(i)
+      do i = 1, operators%n
+        if (operators%share_of(i) > 0.0_wp) &
+          operators%weighed_moment(i, :) = operators%moment(i, :) / operators%share_of(i)
       end do
     end if
   end subroutine new_lattice_operators
@@ -134,18 +138,18 @@ contains
     type(lattice_operators_t), intent(inout) :: operators
     integer, allocatable :: fewest(:), poorest(:)
     integer(i8), allocatable :: n_bonds(:)
-    integer :: block, n_blocks, lo
+    type(blocks_t) :: blocks
+    integer :: block
 
+    blocks = operators%domain%blocks
     allocate (operators%weight_sum(operators%n), source=1.0_wp)
     allocate (operators%moment(operators%n, 2), source=0.0_wp)
-    n_blocks = (operators%last_point - operators%first_point) / n_block + 1
-    allocate (fewest(n_blocks), poorest(n_blocks), n_bonds(n_blocks))
-    !$omp parallel do schedule(static) default(none) private(block, lo) &
-    !$omp shared(operators, n_blocks, fewest, poorest, n_bonds)
-    do block = 1, n_blocks
-      lo = operators%first_point + (block - 1) * n_block
-      call weigh_block_of(operators, lo, min(lo + n_block - 1, operators%last_point), &
-        fewest(block), poorest(block), n_bonds(block))
+    allocate (fewest(blocks%count), poorest(blocks%count), n_bonds(blocks%count))
+    !$omp parallel do schedule(static) default(none) private(block) &
+    !$omp shared(operators, blocks, fewest, poorest, n_bonds)
+    do block = 1, blocks%count
+      call count_block(operators, blocks%lo(block), blocks%hi(block), fewest(block), &
+        poorest(block), n_bonds(block))
     end do
     !$omp end parallel do
     operators%n_bonds = sum(n_bonds)
@@ -153,8 +157,8 @@ contains
     operators%poorest = poorest(minloc(fewest, dim=1))
   end subroutine weigh
 
-  !> The same for points lo to hi.
-  subroutine weigh_block_of(operators, lo, hi, fewest, poorest, n_bonds)
+  !> The same for places lo to hi.
+  subroutine count_block(operators, lo, hi, fewest, poorest, n_bonds)
     type(lattice_operators_t), intent(inout) :: operators
     integer,     intent(in)  :: lo, hi
     integer,     intent(out) :: fewest, poorest   !! bonds of any point, and the first such
@@ -165,7 +169,7 @@ contains
     total = 0.0_wp
     moment = 0.0_wp
     found = 0
-    associate (share => operators%share)
+    associate (share => operators%share_of)
       do k = 1, operators%n_pairs
         s = operators%shift(k)
         do i = 1, hi - lo + 1
@@ -190,46 +194,46 @@ contains
         poorest = lo - 1 + i
       end do
     end associate
-  end subroutine weigh_block_of
+  end subroutine count_block
 
-  !> G[u] of points lo to hi: h = sum_j omega V_j (u_j - u_i) (x) xi.
-  pure subroutine gradient_block(self, lo, hi, u, h)
+  !> G[u] of places lo to hi: g = sum_j omega V_j (u_j - u_i) (x) xi.
+  pure subroutine gradient_sums_block(self, lo, hi, u, g)
     class(lattice_operators_t), intent(in) :: self
     integer,  intent(in) :: lo, hi
     real(wp), intent(in),    contiguous :: u(:, :)   !! (n,2) [m]
-    real(wp), intent(inout), contiguous :: h(:, :)   !! out: (n,4) xx xy yx yy [m^4]
+    real(wp), intent(inout), contiguous :: g(:, :)   !! out: (n,4) xx xy yx yy [m^4]
 
     if (self%weighs) then
-      call gradient_of_shares(self, lo, hi, self%weighed, u, h)
+      call gradient_of_shares(self, lo, hi, self%weighed, u, g)
     else
-      call gradient_of_shares(self, lo, hi, u, u, h)
+      call gradient_of_shares(self, lo, hi, u, u, g)
     end if
-  end subroutine gradient_block
+  end subroutine gradient_sums_block
 
   !> The same from u~ and u.
-  pure subroutine gradient_of_shares(self, lo, hi, w, u, h)
+  pure subroutine gradient_of_shares(self, lo, hi, w, u, g)
     class(lattice_operators_t), intent(in) :: self
     integer,  intent(in) :: lo, hi
     real(wp), intent(in),    contiguous :: w(:, :)   !! u~ (n,2) [m]
     real(wp), intent(in),    contiguous :: u(:, :)   !! (n,2) [m]
-    real(wp), intent(inout), contiguous :: h(:, :)   !! out: (n,4) [m^4]
+    real(wp), intent(inout), contiguous :: g(:, :)   !! out: (n,4) [m^4]
     integer :: i, c
 
     !$omp simd simdlen(8)
     do i = lo, hi
-      h(i, 1) = -u(i, 1) * self%moment(i, 1)
-      h(i, 2) = -u(i, 1) * self%moment(i, 2)
-      h(i, 3) = -u(i, 2) * self%moment(i, 1)
-      h(i, 4) = -u(i, 2) * self%moment(i, 2)
+      g(i, 1) = -u(i, 1) * self%moment(i, 1)
+      g(i, 2) = -u(i, 1) * self%moment(i, 2)
+      g(i, 3) = -u(i, 2) * self%moment(i, 1)
+      g(i, 4) = -u(i, 2) * self%moment(i, 2)
     end do
     do c = 1, 2
-      call add_sums(self%columns, self%columns%x, lo, hi, w(:, c), h(lo:hi, 2 * c - 1))
-      call add_sums(self%columns, self%columns%y, lo, hi, w(:, c), h(lo:hi, 2 * c))
+      call add_sums(self%columns, self%columns%x, lo, hi, w(:, c), g(lo:hi, 2 * c - 1))
+      call add_sums(self%columns, self%columns%y, lo, hi, w(:, c), g(lo:hi, 2 * c))
     end do
   end subroutine gradient_of_shares
 
-  !> D[A] of points lo to hi: f = sum_j omega V_j (A_i + A_j) xi.
-  pure subroutine divergence_block(self, lo, hi, a, f)
+  !> D[A] of places lo to hi: f = sum_j omega V_j (A_i + A_j) xi.
+  pure subroutine divergence_sums_block(self, lo, hi, a, f)
     class(lattice_operators_t), intent(in) :: self
     integer,  intent(in) :: lo, hi
     real(wp), intent(in),    contiguous :: a(:, :)   !! A~ (n,4) xx xy yx yy [N/m^6]
@@ -245,9 +249,9 @@ contains
       call add_sums(self%columns, self%columns%x, lo, hi, a(:, 2 * c - 1), f(lo:hi, c))
       call add_sums(self%columns, self%columns%y, lo, hi, a(:, 2 * c), f(lo:hi, c))
     end do
-  end subroutine divergence_block
+  end subroutine divergence_sums_block
 
-  !> f = A s for points lo to hi.
+  !> f = A s for places lo to hi.
   pure subroutine add_own_part(lo, hi, moment, a, f)
     integer,  intent(in) :: lo, hi
     real(wp), intent(in),    contiguous :: moment(:, :)   !! (n,2)
@@ -263,29 +267,30 @@ contains
   end subroutine add_own_part
 
   !> Stiffness of the control, and what it takes of it whatever u is:
-  !> held = c L[share] + L[c share], L by columns, with the point itself.
+  !> k = c L[share] + L[c share], L by columns, with the point itself.
   subroutine set_control(self, c)
     class(lattice_operators_t), intent(inout) :: self
     real(wp), intent(in), contiguous :: c(:)   !! (n) [N/m^6]; voids: 0
     real(wp), allocatable :: shared(:)
-    integer :: lo, hi
+    integer :: block, lo, hi
 
     self%control = c
-    shared = self%share * c
+    shared = self%share_of * c
     if (.not. allocated(self%pull)) allocate (self%pull(self%n, 2), source=0.0_wp)
-    if (.not. allocated(self%held)) allocate (self%held(self%n), source=0.0_wp)
-    !$omp parallel do schedule(static) default(none) shared(self, c, shared) private(lo, hi)
-    do lo = self%first_point, self%last_point, n_block
-      hi = min(lo + n_block - 1, self%last_point)
-      self%held(lo:hi) = c(lo:hi) * (self%weight_sum(lo:hi) + self%own_weight * self%share(lo:hi))
-      call add_sums(self%columns, self%columns%l, lo, hi, shared, self%held(lo:hi))
+    if (.not. allocated(self%stiffness)) allocate (self%stiffness(self%n), source=0.0_wp)
+    !$omp parallel do schedule(static) default(none) shared(self, c, shared) private(block, lo, hi)
+    do block = 1, self%domain%blocks%count
+      lo = self%domain%blocks%lo(block)
+      hi = self%domain%blocks%hi(block)
+      self%stiffness(lo:hi) = c(lo:hi) * (self%weight_sum(lo:hi) + self%own_weight * self%share_of(lo:hi))
+      call add_sums(self%columns, self%columns%l, lo, hi, shared, self%stiffness(lo:hi))
     end do
     !$omp end parallel do
   end subroutine set_control
 
-  !> f <- f + Z[u] for points lo to hi: Z_i = c_i L[u~]_i + L[c u~]_i - held_i u_i. Each L contains
+  !> f <- f + Z[u] for places lo to hi: Z_i = c_i L[u~]_i + L[c u~]_i - k_i u_i. Each L contains
   !> the point itself; these terms cancel.
-  pure subroutine control_block(self, lo, hi, u, f)
+  pure subroutine control_sums_block(self, lo, hi, u, f)
     class(lattice_operators_t), intent(in) :: self
     integer,  intent(in) :: lo, hi
     real(wp), intent(in),    contiguous :: u(:, :)   !! (n,2) [m]
@@ -296,7 +301,7 @@ contains
     else
       call control_of_shares(self, lo, hi, u, u, f)
     end if
-  end subroutine control_block
+  end subroutine control_sums_block
 
   !> The same from u~ and u.
   pure subroutine control_of_shares(self, lo, hi, w, u, f)
@@ -315,7 +320,7 @@ contains
       !$omp simd simdlen(8) private(b)
       do i = lo, hi
         b = i - lo + 1
-        near(b) = self%control(i) * near(b) - self%held(i) * u(i, k)
+        near(b) = self%control(i) * near(b) - self%stiffness(i) * u(i, k)
       end do
       call add_sums(self%columns, self%columns%l, lo, hi, self%pull(:, k), near(:n))
       !$omp simd simdlen(8)
@@ -329,14 +334,16 @@ contains
   subroutine shape_tensor(self, k)
     class(lattice_operators_t), intent(in) :: self
     real(wp), intent(inout), contiguous :: k(:, :)   !! out: (n,3) xx yy xy [m^4]
-    integer  :: lo, hi, i, p
+    integer  :: block, lo, hi, i, p
     real(wp) :: both
 
     k = 0.0_wp
-    !$omp parallel do schedule(static) default(none) shared(self, k) private(lo, hi, i, p, both)
-    do lo = self%first_point, self%last_point, n_block
-      hi = min(lo + n_block - 1, self%last_point)
-      associate (share => self%share, shift => self%shift, xi => self%xi)
+    !$omp parallel do schedule(static) default(none) shared(self, k) &
+    !$omp private(block, lo, hi, i, p, both)
+    do block = 1, self%domain%blocks%count
+      lo = self%domain%blocks%lo(block)
+      hi = self%domain%blocks%hi(block)
+      associate (share => self%share_of, shift => self%shift, xi => self%xi)
         do p = 1, self%n_pairs
           do i = lo, hi
             if (share(i) <= 0.0_wp) cycle
@@ -351,30 +358,30 @@ contains
     !$omp end parallel do
   end subroutine shape_tensor
 
-  !> Part of the deformation that F does not see, squared and weighted over the family.
-  subroutine zero_energy_squared(self, u, deformation_gradient, z2)
+  !> Part of the deformation that H does not see, squared and weighted over the family.
+  subroutine zero_energy_squared(self, u, h, z2)
     class(lattice_operators_t), intent(in) :: self
-    real(wp), intent(in),    contiguous :: u(:, :)                     !! (n,2) [m]
-    real(wp), intent(in),    contiguous :: deformation_gradient(:, :)  !! F (n,4) xx xy yx yy
-    real(wp), intent(inout), contiguous :: z2(:)                       !! out: (n) [m^4]
-    integer :: lo
+    real(wp), intent(in),    contiguous :: u(:, :)   !! (n,2) [m]
+    real(wp), intent(in),    contiguous :: h(:, :)   !! H (n,4) xx xy yx yy
+    real(wp), intent(inout), contiguous :: z2(:)     !! out: (n) [m^4]
+    type(blocks_t) :: blocks
+    integer :: block
 
+    blocks = self%domain%blocks
     z2 = 0.0_wp
-    !$omp parallel do schedule(static) default(none) private(lo) &
-    !$omp shared(self, u, deformation_gradient, z2)
-    do lo = self%first_point, self%last_point, n_block
-      call zero_energy_block(self, lo, min(lo + n_block - 1, self%last_point), u, &
-        deformation_gradient, z2)
+    !$omp parallel do schedule(static) default(none) private(block) shared(self, blocks, u, h, z2)
+    do block = 1, blocks%count
+      call zero_energy_block(self, blocks%lo(block), blocks%hi(block), u, h, z2)
     end do
     !$omp end parallel do
   end subroutine zero_energy_squared
 
-  !> The same for points lo to hi.
-  pure subroutine zero_energy_block(self, lo, hi, u, f, z2)
+  !> The same for places lo to hi.
+  pure subroutine zero_energy_block(self, lo, hi, u, h, z2)
     class(lattice_operators_t), intent(in) :: self
     integer,  intent(in) :: lo, hi
     real(wp), intent(in),    contiguous :: u(:, :)   !! (n,2) [m]
-    real(wp), intent(in),    contiguous :: f(:, :)   !! F (n,4) xx xy yx yy
+    real(wp), intent(in),    contiguous :: h(:, :)   !! H (n,4) xx xy yx yy
     real(wp), intent(inout), contiguous :: z2(:)     !! out: (n) [m^4]; voids: 0
     real(wp) :: x, y, weight, ax, ay, plus, minus
     integer  :: i, k, s
@@ -386,15 +393,15 @@ contains
       weight = self%weight(k)
       !$omp simd simdlen(8) private(ax, ay, plus, minus)
       do i = lo, hi
-        ax = (f(i, 1) - 1.0_wp) * x + f(i, 2) * y
-        ay = f(i, 3) * x + (f(i, 4) - 1.0_wp) * y
+        ax = h(i, 1) * x + h(i, 2) * y
+        ay = h(i, 3) * x + h(i, 4) * y
         plus = (u(i + s, 1) - u(i, 1) - ax)**2 + (u(i + s, 2) - u(i, 2) - ay)**2
         minus = (u(i - s, 1) - u(i, 1) + ax)**2 + (u(i - s, 2) - u(i, 2) + ay)**2
-        z2(i) = z2(i) + weight * (self%share(i + s) * plus + self%share(i - s) * minus)
+        z2(i) = z2(i) + weight * (self%share_of(i + s) * plus + self%share_of(i - s) * minus)
       end do
     end do
     do i = lo, hi
-      if (self%share(i) <= 0.0_wp) z2(i) = 0.0_wp
+      if (self%share_of(i) <= 0.0_wp) z2(i) = 0.0_wp
     end do
   end subroutine zero_energy_block
 
@@ -411,7 +418,7 @@ contains
     integer,                    intent(out) :: fewest, point
 
     fewest = self%fewest
-    point = self%poorest
+    point = self%storage%point_at(self%poorest)
   end subroutine fewest_bonds
 
   !> Memory that the operators take [bytes].

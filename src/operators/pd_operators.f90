@@ -1,45 +1,61 @@
-!> The non-local operators over all families, behind one interface:
+!> The consistent gradient over families and its adjoint, with everything that they need inside.
 !>
-!>   gradient    G[u]_i = sum_j omega V_j (u_j - u_i) (x) xi
-!>   divergence  D[A]_i = sum_j omega V_j (A_i + A_j) xi
-!>   control     Z[u]_i = sum_j omega V_j (c_i + c_j) (u_j - u_i)
+!>   H_i = G[u]_i K_i^-1               G[u]_i = sum_j omega V_j (u_j - u_i) (x) xi
+!>   f_i = D[A]_i + Z[u]_i             D[A]_i = sum_j omega V_j (A_i + A_j) xi
+!>   A_i = P_i K_i^-1 - c_i H_i        Z[u]_i = sum_j omega V_j (c_i + c_j) (u_j - u_i)
+!>
+!> H = F - I is handed out and the first Piola stress P taken in; f is minus the adjoint of H. A is
+!> the force tensor: the force state of a bond is omega A xi. c is the stiffness of the zero-energy
+!> control, whose affine part joins A.
+!>
+!> In this order, once per state of u:
+!>
+!>   take_in(u)                          u can be read by the sums
+!>   gradient_block(lo, hi, u, h)        for every block
+!>   hand_over_block(lo, hi, h, p)       for every block; takes P, keeps A
+!>   share()                             A can be read by the sums
+!>   force_block(lo, hi, u, f)           for every block
 !>
 !> Two realisations: `pd_bond_list` for any points, `pd_lattice` for bodies on a lattice. Set-up
-!> chooses; nobody else knows which it is.
-!>
-!> Sums are offered for a block of points, so that a time step can go on with a block while it is
-!> in the cache, and for all points. Where the weights of the bonds do not know what the neighbour
-!> owns, its share belongs to the field: `weigh_displacement` goes before the blocks of G,
-!> `weigh_block` follows whoever has written a block of A.
+!> chooses; nobody else knows which it is. A realisation provides the sums G, D and Z. Where its
+!> weights do not know what the neighbour owns, that share belongs to the fields that are summed.
 !> Source: doc/theory.md, sections 2, 4 and 5.
 module pd_operators
-  use pd_kinds, only: i8, n_block, wp
+  use pd_blocks, only: blocks_t
+  use pd_domain, only: domain_t
+  use pd_kinds, only: block_sum, i8, n_block, pi, wp
+  use pd_storage, only: storage_t
   implicit none
   private
 
-  public :: operators_t
+  public :: operators_t, control_stiffness
 
-  !> Operators of one body. Fields have a place for each of its n points; places of a lattice that
-  !> hold no point (voids) must carry zero in every field.
+  !> Operators of one body. Fields have n rows, some of which may hold no point.
   type, abstract :: operators_t
-    integer :: n = 0                             !! points, voids included
-    integer :: first_point = 1, last_point = 0   !! between which all points lie that are no voids
-    real(wp), allocatable :: weight_sum(:)       !! W_i = sum_j omega V_j (n) [m^2]; voids: 1
-    logical :: weighs = .false.                  !! fields are weighed with the share
-    real(wp), allocatable :: share(:)            !! part of a whole cell that a point owns (n)
-    real(wp), allocatable :: weighed(:, :)       !! share u, for blocks of G and Z (n,2) [m]
-    real(wp), allocatable :: control(:)          !! c (n) [N/m^6]; not allocated: no control
-    real(wp), allocatable :: pull(:, :)          !! share times c u (n,2) [N/m^5]; where Z needs it
+    integer :: n = 0                                      !! rows of the fields
+    type(storage_t) :: storage                            !! row of every point
+    type(domain_t)  :: domain                             !! blocks of rows
+    real(wp), allocatable :: weight_sum(:)                !! W_i = sum_j omega V_j (n) [m^2]
+    real(wp), allocatable :: k_inverse(:, :)              !! K^-1 (n,3) xx yy xy [1/m^4]
+    real(wp), allocatable :: control(:)                   !! c (n) [N/m^6]; not allocated: none
+    real(wp), allocatable, private :: force_tensor(:, :)  !! A (n,4), weighed [N/m^6]
+    logical :: weighs = .false.                           !! the sums read weighed fields
+    real(wp), allocatable :: share_of(:)                  !! part of a whole cell that a point owns (n)
+    real(wp), allocatable :: weighed(:, :)                !! share u (n,2) [m]
+    real(wp), allocatable :: pull(:, :)                   !! share c u, where Z reads it (n,2) [N/m^5]
   contains
-    procedure(gradient_of), deferred :: gradient_block
-    procedure(divergence_of), deferred :: divergence_block
-    procedure(control_of), deferred :: control_block
+    procedure :: take_in
+    procedure :: gradient_block
+    procedure :: hand_over_block
+    procedure :: share
+    procedure :: force_block
     procedure :: set_control
-    procedure :: weigh_displacement
-    procedure :: weigh_block
-    procedure :: gradient
-    procedure :: divergence
-    procedure :: add_control
+    procedure :: control_energy
+    procedure, private :: weigh_in
+    procedure, private :: weigh_block
+    procedure(gradient_of), deferred :: gradient_sums_block
+    procedure(divergence_of), deferred :: divergence_sums_block
+    procedure(control_of), deferred :: control_sums_block
     procedure(shape_of), deferred :: shape_tensor
     procedure(zero_energy_of), deferred :: zero_energy_squared
     procedure(bonds_of), deferred :: bonds
@@ -48,15 +64,15 @@ module pd_operators
   end type operators_t
 
   abstract interface
-    !> G[u] of points lo to hi: h = sum_j omega V_j (u_j - u_i) (x) xi. u has been weighed.
-    pure subroutine gradient_of(self, lo, hi, u, h)
+    !> G[u] of rows lo to hi. u has been weighed in.
+    pure subroutine gradient_of(self, lo, hi, u, g)
       import :: operators_t, wp
       class(operators_t), intent(in) :: self
       integer,  intent(in) :: lo, hi
       real(wp), intent(in),    contiguous :: u(:, :)   !! (n,2) [m]
-      real(wp), intent(inout), contiguous :: h(:, :)   !! out: (n,4) xx xy yx yy [m^4]
+      real(wp), intent(inout), contiguous :: g(:, :)   !! out: (n,4) xx xy yx yy [m^4]
     end subroutine gradient_of
-    !> D[A] of points lo to hi: f = sum_j omega V_j (A_i + A_j) xi. A has been weighed.
+    !> D[A] of rows lo to hi. A has been weighed.
     pure subroutine divergence_of(self, lo, hi, a, f)
       import :: operators_t, wp
       class(operators_t), intent(in) :: self
@@ -64,8 +80,7 @@ module pd_operators
       real(wp), intent(in),    contiguous :: a(:, :)   !! (n,4) xx xy yx yy [N/m^6]
       real(wp), intent(inout), contiguous :: f(:, :)   !! out: (n,2) [N/m^3]
     end subroutine divergence_of
-    !> f <- f + Z[u] for points lo to hi: the bond part of the zero-energy control. Its affine part
-    !> belongs to A. u has been weighed.
+    !> f <- f + Z[u] for rows lo to hi. u has been weighed in.
     pure subroutine control_of(self, lo, hi, u, f)
       import :: operators_t, wp
       class(operators_t), intent(in) :: self
@@ -73,20 +88,20 @@ module pd_operators
       real(wp), intent(in),    contiguous :: u(:, :)   !! (n,2) [m]
       real(wp), intent(inout), contiguous :: f(:, :)   !! (n,2) [N/m^3]
     end subroutine control_of
-    !> K = sum_j omega V_j xi (x) xi; voids: zero.
+    !> K = sum_j omega V_j xi (x) xi; rows without a point: zero.
     subroutine shape_of(self, k)
       import :: operators_t, wp
       class(operators_t), intent(in) :: self
       real(wp), intent(inout), contiguous :: k(:, :)   !! out: (n,3) xx yy xy [m^4]
     end subroutine shape_of
-    !> Part of the deformation that the deformation gradient does not see, squared and weighted
-    !> over the family: sum_j omega V_j |z|^2 with z = (u_j - u_i) - (F_i - I) xi.
-    subroutine zero_energy_of(self, u, deformation_gradient, z2)
+    !> Part of the deformation that H does not see, squared and weighted over the family:
+    !> sum_j omega V_j |z|^2 with z = (u_j - u_i) - H_i xi.
+    subroutine zero_energy_of(self, u, h, z2)
       import :: operators_t, wp
       class(operators_t), intent(in) :: self
-      real(wp), intent(in),    contiguous :: u(:, :)                     !! (n,2) [m]
-      real(wp), intent(in),    contiguous :: deformation_gradient(:, :)  !! F (n,4) xx xy yx yy
-      real(wp), intent(inout), contiguous :: z2(:)                       !! out: (n) [m^4]
+      real(wp), intent(in),    contiguous :: u(:, :)   !! (n,2) [m]
+      real(wp), intent(in),    contiguous :: h(:, :)   !! H (n,4) xx xy yx yy
+      real(wp), intent(inout), contiguous :: z2(:)     !! out: (n) [m^4]
     end subroutine zero_energy_of
     !> Number of directed bonds.
     pure integer(i8) function bonds_of(self)
@@ -99,7 +114,7 @@ module pd_operators
       class(operators_t), intent(in) :: self
       integer, intent(out) :: fewest, point
     end subroutine fewest_of
-    !> Memory that the operators take [bytes].
+    !> Memory that the realisation takes beside the fields of this type [bytes].
     pure real(wp) function memory_of(self)
       import :: operators_t, wp
       class(operators_t), intent(in) :: self
@@ -108,41 +123,45 @@ module pd_operators
 
 contains
 
-  !> Stiffness of the zero-energy control, from now on.
-  subroutine set_control(self, c)
+  !> Make u readable for the sums.
+  subroutine take_in(self, u)
     class(operators_t), intent(inout) :: self
-    real(wp), intent(in), contiguous  :: c(:)   !! (n) [N/m^6]; voids: 0
+    real(wp), intent(inout), contiguous :: u(:, :)   !! (n,2) [m]; its halo is brought up to date
 
-    self%control = c
-  end subroutine set_control
+    call self%domain%halo%exchange(u)
+    call self%weigh_in(u)
+    if (.not. allocated(self%force_tensor)) &
+      allocate (self%force_tensor(self%n, 4), source=0.0_wp)   ! rows without a point stay zero
+  end subroutine take_in
 
-  !> Keep u for the blocks of G and Z, weighed with what the points own and, where Z needs it, with
-  !> the stiffness of the control.
-  subroutine weigh_displacement(self, u)
+  !> Keep u weighed with what the points own and, for Z, with the stiffness of the control.
+  subroutine weigh_in(self, u)
     class(operators_t), intent(inout) :: self
-    real(wp), intent(in), contiguous  :: u(:, :)   !! (n,2) [m]
-    integer :: i
+    real(wp), intent(in), contiguous :: u(:, :)   !! (n,2) [m]
+    integer :: i, first, last
 
+    first = self%domain%blocks%first
+    last = self%domain%blocks%last
     if (self%weighs) then
       if (.not. allocated(self%weighed)) allocate (self%weighed(self%n, 2), source=0.0_wp)
-      !$omp parallel do simd schedule(static) default(none) shared(self, u) private(i)
-      do i = self%first_point, self%last_point
-        self%weighed(i, 1) = self%share(i) * u(i, 1)
-        self%weighed(i, 2) = self%share(i) * u(i, 2)
+      !$omp parallel do simd schedule(static) default(none) shared(self, u, first, last) private(i)
+      do i = first, last
+        self%weighed(i, 1) = self%share_of(i) * u(i, 1)
+        self%weighed(i, 2) = self%share_of(i) * u(i, 2)
       end do
       !$omp end parallel do simd
     end if
     if (allocated(self%pull)) then
-      !$omp parallel do simd schedule(static) default(none) shared(self, u) private(i)
-      do i = self%first_point, self%last_point
-        self%pull(i, 1) = self%share(i) * self%control(i) * u(i, 1)
-        self%pull(i, 2) = self%share(i) * self%control(i) * u(i, 2)
+      !$omp parallel do simd schedule(static) default(none) shared(self, u, first, last) private(i)
+      do i = first, last
+        self%pull(i, 1) = self%share_of(i) * self%control(i) * u(i, 1)
+        self%pull(i, 2) = self%share_of(i) * self%control(i) * u(i, 2)
       end do
       !$omp end parallel do simd
     end if
-  end subroutine weigh_displacement
+  end subroutine weigh_in
 
-  !> A <- A weighed with what the points own, for points lo to hi.
+  !> A <- A weighed with what the points own, for rows lo to hi.
   pure subroutine weigh_block(self, lo, hi, a)
     class(operators_t), intent(in) :: self
     integer,  intent(in) :: lo, hi
@@ -152,56 +171,194 @@ contains
     if (.not. self%weighs) return
     do c = 1, size(a, 2)
       do i = lo, hi
-        a(i, c) = self%share(i) * a(i, c)
+        a(i, c) = self%share_of(i) * a(i, c)
       end do
     end do
   end subroutine weigh_block
 
-  !> G[u] of all points.
-  subroutine gradient(self, u, h)
-    class(operators_t), intent(inout) :: self
-    real(wp), intent(in),    contiguous :: u(:, :)   !! (n,2) [m]
-    real(wp), intent(inout), contiguous :: h(:, :)   !! out: (n,4) xx xy yx yy [m^4]
-    integer :: lo
-
-    call self%weigh_displacement(u)
-    !$omp parallel do schedule(static) default(none) shared(self, u, h) private(lo)
-    do lo = self%first_point, self%last_point, n_block
-      call self%gradient_block(lo, min(lo + n_block - 1, self%last_point), u, h)
-    end do
-    !$omp end parallel do
-  end subroutine gradient
-
-  !> D[A] of all points.
-  subroutine divergence(self, a, f)
+  !> H = F - I of rows lo to hi: affine motions are exact at every point.
+  pure subroutine gradient_block(self, lo, hi, u, h)
     class(operators_t), intent(in) :: self
-    real(wp), intent(in),    contiguous :: a(:, :)   !! (n,4) xx xy yx yy [N/m^6]; not weighed
-    real(wp), intent(inout), contiguous :: f(:, :)   !! out: (n,2) [N/m^3]
-    real(wp), allocatable :: weighed(:, :)
-    integer :: lo
+    integer,  intent(in) :: lo, hi
+    real(wp), intent(in),    contiguous :: u(:, :)   !! (n,2) [m]; as taken in
+    real(wp), intent(inout), contiguous :: h(:, :)   !! out: (n,4) xx xy yx yy
+    integer  :: i
+    real(wp) :: gxx, gxy, gyx, gyy
 
-    allocate (weighed(size(a, 1), size(a, 2)), source=a)
-    call self%weigh_block(1, self%n, weighed)
-    !$omp parallel do schedule(static) default(none) shared(self, weighed, f) private(lo)
-    do lo = self%first_point, self%last_point, n_block
-      call self%divergence_block(lo, min(lo + n_block - 1, self%last_point), weighed, f)
-    end do
-    !$omp end parallel do
-  end subroutine divergence
+    call self%gradient_sums_block(lo, hi, u, h)
+    associate (k => self%k_inverse)
+      !$omp simd simdlen(8) private(gxx, gxy, gyx, gyy)
+      do i = lo, hi
+        gxx = h(i, 1)
+        gxy = h(i, 2)
+        gyx = h(i, 3)
+        gyy = h(i, 4)
+        h(i, 1) = gxx * k(i, 1) + gxy * k(i, 3)
+        h(i, 2) = gxx * k(i, 3) + gxy * k(i, 2)
+        h(i, 3) = gyx * k(i, 1) + gyy * k(i, 3)
+        h(i, 4) = gyx * k(i, 3) + gyy * k(i, 2)
+      end do
+    end associate
+  end subroutine gradient_block
 
-  !> f <- f + Z[u] for all points.
-  subroutine add_control(self, u, f)
+  !> Take the first Piola stress of rows lo to hi, and keep A = P K^-1 - c H.
+  !>
+  !> A control that follows the material gets here, per block, what the law tells of its flow.
+  pure subroutine hand_over_block(self, lo, hi, h, p)
     class(operators_t), intent(inout) :: self
-    real(wp), intent(in),    contiguous :: u(:, :)   !! (n,2) [m]
-    real(wp), intent(inout), contiguous :: f(:, :)   !! (n,2) [N/m^3]
-    integer :: lo
+    integer,  intent(in) :: lo, hi
+    real(wp), intent(in), contiguous :: h(:, :)   !! H (n,4) xx xy yx yy
+    real(wp), intent(in), contiguous :: p(:, :)   !! P xx xy yx yy [Pa]; row 1 is row lo
+    integer :: i, b
 
-    call self%weigh_displacement(u)
-    !$omp parallel do schedule(static) default(none) shared(self, u, f) private(lo)
-    do lo = self%first_point, self%last_point, n_block
-      call self%control_block(lo, min(lo + n_block - 1, self%last_point), u, f)
+    associate (k => self%k_inverse, a => self%force_tensor)
+      !$omp simd simdlen(8) private(b)
+      do i = lo, hi
+        b = i - lo + 1
+        a(i, 1) = p(b, 1) * k(i, 1) + p(b, 2) * k(i, 3)
+        a(i, 2) = p(b, 1) * k(i, 3) + p(b, 2) * k(i, 2)
+        a(i, 3) = p(b, 3) * k(i, 1) + p(b, 4) * k(i, 3)
+        a(i, 4) = p(b, 3) * k(i, 3) + p(b, 4) * k(i, 2)
+      end do
+    end associate
+    if (allocated(self%control)) &
+      call subtract_affine_control(lo, hi, self%control, h, self%force_tensor)
+    call self%weigh_block(lo, hi, self%force_tensor)
+  end subroutine hand_over_block
+
+  !> A <- A - c H for rows lo to hi.
+  pure subroutine subtract_affine_control(lo, hi, c, h, a)
+    integer,  intent(in) :: lo, hi
+    real(wp), intent(in),    contiguous :: c(:)      !! (n) [N/m^6]
+    real(wp), intent(in),    contiguous :: h(:, :)   !! H (n,4) xx xy yx yy
+    real(wp), intent(inout), contiguous :: a(:, :)   !! A (n,4) xx xy yx yy [N/m^6]
+    integer :: i
+
+    !$omp simd simdlen(8)
+    do i = lo, hi
+      a(i, 1) = a(i, 1) - c(i) * h(i, 1)
+      a(i, 2) = a(i, 2) - c(i) * h(i, 2)
+      a(i, 3) = a(i, 3) - c(i) * h(i, 3)
+      a(i, 4) = a(i, 4) - c(i) * h(i, 4)
+    end do
+  end subroutine subtract_affine_control
+
+  !> Make A readable for the sums, after the last block has been handed over.
+  subroutine share(self)
+    class(operators_t), intent(inout) :: self
+
+    call self%domain%halo%exchange(self%force_tensor)
+  end subroutine share
+
+  !> Internal force density of rows lo to hi, the control included.
+  pure subroutine force_block(self, lo, hi, u, f)
+    class(operators_t), intent(in) :: self
+    integer,  intent(in) :: lo, hi
+    real(wp), intent(in),    contiguous :: u(:, :)   !! (n,2) [m]; as taken in
+    real(wp), intent(inout), contiguous :: f(:, :)   !! out: (n,2) [N/m^3]
+
+    call self%divergence_sums_block(lo, hi, self%force_tensor, f)
+    if (allocated(self%control)) call self%control_sums_block(lo, hi, u, f)
+  end subroutine force_block
+
+  !> Stiffness of the control after Silling, c_i = g C_0 / W_i with C_0 = 48 E / (5 pi delta^2).
+  elemental real(wp) function control_stiffness(factor, youngs_modulus, delta, weight_sum) result(c)
+    real(wp), intent(in) :: factor            !! g
+    real(wp), intent(in) :: youngs_modulus    !! E [Pa]
+    real(wp), intent(in) :: delta             !! horizon [m]
+    real(wp), intent(in) :: weight_sum        !! W [m^2]
+
+    c = factor * 48.0_wp * youngs_modulus / (5.0_wp * pi * delta**2) / weight_sum
+  end function control_stiffness
+
+  !> Stiffness of the zero-energy control, from now on.
+  subroutine set_control(self, c)
+    class(operators_t), intent(inout) :: self
+    real(wp), intent(in), contiguous  :: c(:)   !! (n) [N/m^6]; rows without a point: 0
+
+    self%control = c
+  end subroutine set_control
+
+  !> Energy of the control: with constant c it has a potential, (1/2) sum V c sum omega V_j |z|^2,
+  !> which is the work of the control forces without the error of adding it up. The force is linear
+  !> in u, so this is half of the force times u:
+  !>
+  !>   -(1/2) sum_i V_i (u_i - u_mean) . Z[u]_i - (1/2) sum_i V_i c_i H_i : H_i K_i
+  !>
+  !> The mean adds nothing, for the forces are in balance; without it digits of u would be lost.
+  subroutine control_energy(self, volume, u, h, energy)
+    class(operators_t), intent(in) :: self
+    real(wp), intent(in), contiguous :: volume(:)   !! V (n) [m^2]
+    real(wp), intent(in), contiguous :: u(:, :)     !! (n,2) [m]; as taken in
+    real(wp), intent(in), contiguous :: h(:, :)     !! H (n,4) xx xy yx yy
+    real(wp), intent(out) :: energy                 !! [J/m]; round-off does not make it negative
+    type(blocks_t) :: blocks
+    real(wp), allocatable :: parts(:, :), z(:, :)
+    real(wp) :: mean(2)
+    integer  :: block
+
+    energy = 0.0_wp
+    if (.not. allocated(self%control)) return
+    allocate (z(self%n, 2), source=0.0_wp)
+    blocks = self%domain%blocks
+    allocate (parts(blocks%count, 3))
+    !$omp parallel do schedule(static) default(none) private(block) &
+    !$omp shared(blocks, volume, u, parts)
+    do block = 1, blocks%count
+      parts(block, :) = moments_of_block(blocks%lo(block), blocks%hi(block), volume, u)
     end do
     !$omp end parallel do
-  end subroutine add_control
+    mean = [blocks%total(parts(:, 2)), blocks%total(parts(:, 3))] / blocks%total(parts(:, 1))
+    !$omp parallel do schedule(static) default(none) private(block) &
+    !$omp shared(self, blocks, volume, u, h, mean, z, parts)
+    do block = 1, blocks%count
+      call self%control_sums_block(blocks%lo(block), blocks%hi(block), u, z)
+      parts(block, 1) = control_energy_of_block(blocks%lo(block), blocks%hi(block), volume, &
+        self%control, self%k_inverse, h, u, mean, z)
+    end do
+    !$omp end parallel do
+    energy = blocks%total(parts(:, 1))
+    if (energy < 0.0_wp) energy = 0.0_wp   ! not max: it would hide what is not a number
+  end subroutine control_energy
+
+  !> Sums of V and V u over rows lo to hi.
+  pure function moments_of_block(lo, hi, volume, u) result(moments)
+    integer,  intent(in) :: lo, hi
+    real(wp), intent(in), contiguous :: volume(:), u(:, :)
+    real(wp) :: moments(3), terms(n_block, 3)
+    integer  :: n
+
+    n = hi - lo + 1
+    terms(n + 1:, :) = 0.0_wp   ! sums go over whole blocks
+    terms(:n, 1) = volume(lo:hi)
+    terms(:n, 2) = volume(lo:hi) * u(lo:hi, 1)
+    terms(:n, 3) = volume(lo:hi) * u(lo:hi, 2)
+    moments = [block_sum(terms(:, 1)), block_sum(terms(:, 2)), block_sum(terms(:, 3))]
+  end function moments_of_block
+
+  !> Energy of the control in rows lo to hi.
+  pure real(wp) function control_energy_of_block(lo, hi, volume, c, k, h, u, mean, z) &
+    result(energy)
+    integer,  intent(in) :: lo, hi
+    real(wp), intent(in), contiguous :: volume(:), c(:), k(:, :), h(:, :), u(:, :), z(:, :)
+    real(wp), intent(in) :: mean(2)   !! of u [m]
+    real(wp) :: terms(n_block), determinant_of_k, kxx, kyy, kxy
+    integer  :: i
+
+    if (hi - lo + 1 < n_block) terms = 0.0_wp   ! sums go over whole blocks
+    !$omp simd simdlen(8) private(determinant_of_k, kxx, kyy, kxy)
+    do i = lo, hi
+      ! rows without a point have K^-1 = 0 and c = 0: the quotients stay finite
+      determinant_of_k = 1.0_wp / max(k(i, 1) * k(i, 2) - k(i, 3)**2, tiny(1.0_wp))
+      kxx = k(i, 2) * determinant_of_k
+      kyy = k(i, 1) * determinant_of_k
+      kxy = -k(i, 3) * determinant_of_k
+      terms(i - lo + 1) = -0.5_wp * volume(i) * ((u(i, 1) - mean(1)) * z(i, 1) &
+        + (u(i, 2) - mean(2)) * z(i, 2) + c(i) * (kxx * (h(i, 1)**2 + h(i, 3)**2) &
+        + kyy * (h(i, 2)**2 + h(i, 4)**2) + 2.0_wp * kxy * (h(i, 1) * h(i, 2) &
+        + h(i, 3) * h(i, 4))))
+    end do
+    energy = block_sum(terms)
+  end function control_energy_of_block
 
 end module pd_operators

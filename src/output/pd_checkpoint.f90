@@ -6,6 +6,7 @@
 !> to the user; it is checked before HDF5 sees the file.
 module pd_checkpoint
   use, intrinsic :: iso_fortran_env, only: int8, int32
+  use pd_clock, only: clock_t
   use pd_errors, only: error_list_t
   use pd_fields, only: field_visitor_t, state_field_t
   use pd_files, only: file_exists, patch_file, replace_file, sync_file
@@ -21,13 +22,12 @@ module pd_checkpoint
 
   !> What a run needs beside its state.
   type :: checkpoint_t
-    integer  :: step = 0
-    real(wp) :: time = 0.0_wp           !! [s]
-    real(wp) :: time_step = 0.0_wp      !! [s]
+    type(clock_t) :: clock
     integer  :: history_rows = 0        !! written so far
     integer  :: frames_written = 0      !! written so far, 000000 among them
     character(:), allocatable :: ledger_names(:)
     real(wp),     allocatable :: ledger(:)          !! any numbers, by these names
+    real(wp),     allocatable :: ledger_blocks(:, :)   !! the same, per block (blocks, numbers)
     character(:), allocatable :: input(:)           !! the values of the input as used
     real(wp),     allocatable :: position(:, :)     !! (n,2) [m]
     real(wp),     allocatable :: volume(:)          !! (n) [m^2]
@@ -148,13 +148,14 @@ contains
 
     call write_attribute(file, '/', 'schema', schema, errors)
     call write_attribute(file, '/', 'schema_version', schema_version, errors)
-    call write_attribute(file, '/', 'step', checkpoint%step, errors)
-    call write_attribute(file, '/', 'time', checkpoint%time, errors)
-    call write_attribute(file, '/', 'time_step', checkpoint%time_step, errors)
+    call write_attribute(file, '/', 'step', checkpoint%clock%step, errors)
+    call write_attribute(file, '/', 'time', checkpoint%clock%time(), errors)
+    call write_attribute(file, '/', 'time_step', checkpoint%clock%time_step, errors)
     call write_attribute(file, '/', 'history_rows', checkpoint%history_rows, errors)
     call write_attribute(file, '/', 'frames_written', checkpoint%frames_written, errors)
     call write_dataset(file, '/ledger_names', checkpoint%ledger_names, errors)
     call write_dataset(file, '/ledger', checkpoint%ledger, errors)
+    call write_dataset(file, '/ledger_blocks', checkpoint%ledger_blocks, errors)
     call write_dataset(file, '/input', checkpoint%input, errors)
     call write_dataset(file, '/position', checkpoint%position, errors)
     call write_dataset(file, '/volume', checkpoint%volume, errors)
@@ -257,13 +258,13 @@ contains
     type(checkpoint_t), intent(inout) :: checkpoint
     type(error_list_t), intent(inout) :: errors
 
-    call read_attribute(file, '/', 'step', checkpoint%step, errors)
-    call read_attribute(file, '/', 'time', checkpoint%time, errors)
-    call read_attribute(file, '/', 'time_step', checkpoint%time_step, errors)
+    call read_attribute(file, '/', 'step', checkpoint%clock%step, errors)
+    call read_attribute(file, '/', 'time_step', checkpoint%clock%time_step, errors)
     call read_attribute(file, '/', 'history_rows', checkpoint%history_rows, errors)
     call read_attribute(file, '/', 'frames_written', checkpoint%frames_written, errors)
     call read_dataset(file, '/ledger_names', checkpoint%ledger_names, errors)
     call read_dataset(file, '/ledger', checkpoint%ledger, errors)
+    call read_dataset(file, '/ledger_blocks', checkpoint%ledger_blocks, errors)
     call read_dataset(file, '/input', checkpoint%input, errors)
     call read_dataset(file, '/position', checkpoint%position, errors)
     call read_dataset(file, '/volume', checkpoint%volume, errors)

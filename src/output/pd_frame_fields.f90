@@ -4,12 +4,11 @@
 !> the XDMF file loop over it; one more field is a procedure and a call here.
 !> Source: doc/theory.md, section 10.
 module pd_frame_fields
-  use pd_j2, only: von_mises
-  use pd_kinds, only: wp
+  use pd_kinds, only: n_block, wp
   use pd_labels, only: field_label_t
   use pd_model, only: model_t
   use pd_state, only: state_t
-  use pd_strain, only: cauchy, determinant, green_lagrange
+  use pd_tensors, only: von_mises
   implicit none
   private
 
@@ -22,7 +21,7 @@ module pd_frame_fields
     integer :: column = 0   !! that the field is about
   end type points_view_t
 
-  !> A field over the points, voids left out.
+  !> A field over the points.
   type, extends(field_label_t) :: frame_field_t
     procedure(field_of_points), pointer, nopass :: values => null()
     integer :: column = 0   !! that it is about, if it is: fields that one procedure serves
@@ -78,60 +77,73 @@ contains
     type(points_view_t), intent(in)  :: view
     real(wp),            intent(out), contiguous :: values(:, :)
 
-    call take(view%model%body%points, view%state%displacement, values)
+    call take(view%model, view%state%displacement, values)
   end subroutine displacement
 
   subroutine velocity(view, values)
     type(points_view_t), intent(in)  :: view
     real(wp),            intent(out), contiguous :: values(:, :)
 
-    call take(view%model%body%points, view%state%velocity, values)
+    call take(view%model, view%state%velocity, values)
   end subroutine velocity
 
   !> Cauchy stress; a point that has failed (det F <= 0) has none: 0.
   subroutine stress(view, values)
     type(points_view_t), intent(in)  :: view
     real(wp),            intent(out), contiguous :: values(:, :)
-    integer :: i
 
-    !$omp parallel do schedule(static) default(none) private(i) shared(view, values)
-    do i = 1, size(view%model%body%points)
-      values(:, i) = cauchy_or_zero(view%model%body%points(i), view%state)
-    end do
-    !$omp end parallel do
+    call take(view%model, cauchy_stress(view), values)
   end subroutine stress
 
   subroutine mises_stress(view, values)
     type(points_view_t), intent(in)  :: view
     real(wp),            intent(out), contiguous :: values(:, :)
+    real(wp), allocatable :: sigma(:, :)
     integer :: i
 
-    !$omp parallel do schedule(static) default(none) private(i) shared(view, values)
-    do i = 1, size(view%model%body%points)
-      values(1, i) = von_mises(cauchy_or_zero(view%model%body%points(i), view%state))
+    allocate (sigma(4, size(values, 2)))
+    call take(view%model, cauchy_stress(view), sigma)
+    do i = 1, size(values, 2)
+      values(1, i) = von_mises(sigma(:, i))
     end do
-    !$omp end parallel do
   end subroutine mises_stress
 
   subroutine strain(view, values)
     type(points_view_t), intent(in)  :: view
     real(wp),            intent(out), contiguous :: values(:, :)
-    real(wp) :: f(4)
-    integer  :: i
+    real(wp), allocatable :: rows(:, :)
+    real(wp) :: in_block(n_block, 4)
+    integer  :: block, lo, hi
 
-    !$omp parallel do schedule(static) default(none) private(i, f) shared(view, values)
-    do i = 1, size(view%model%body%points)
-      f = view%state%deformation_gradient(view%model%body%points(i), :)
-      values(:, i) = green_lagrange(f)
-    end do
-    !$omp end parallel do
+    associate (model => view%model, state => view%state)
+      allocate (rows(model%operators%n, 4), source=0.0_wp)
+      do block = 1, model%blocks%count
+        lo = model%blocks%lo(block)
+        hi = model%blocks%hi(block)
+        call model%materials%strain_block(block, state%displacement_gradient, in_block)
+        rows(lo:hi, :) = in_block(:hi - lo + 1, :)
+      end do
+      call take(model, rows, values)
+    end associate
   end subroutine strain
 
   subroutine plastic_strain(view, values)
     type(points_view_t), intent(in)  :: view
     real(wp),            intent(out), contiguous :: values(:, :)
+    real(wp), allocatable :: rows(:, :)
+    real(wp) :: in_block(n_block)
+    integer  :: block, lo, hi
 
-    values(1, :) = view%state%alpha(view%model%body%points)
+    associate (model => view%model, state => view%state)
+      allocate (rows(model%operators%n, 1), source=0.0_wp)
+      do block = 1, model%blocks%count
+        lo = model%blocks%lo(block)
+        hi = model%blocks%hi(block)
+        call model%materials%plastic_strain_block(block, state%law_points_t, in_block)
+        rows(lo:hi, 1) = in_block(:hi - lo + 1)
+      end do
+      call take(model, rows, values)
+    end associate
   end subroutine plastic_strain
 
   !> The rms of the zero-energy part of the deformation, weighted with omega V over the family, over
@@ -139,41 +151,48 @@ contains
   subroutine zero_energy(view, values)
     type(points_view_t), intent(in)  :: view
     real(wp),            intent(out), contiguous :: values(:, :)
-    real(wp), allocatable :: z2(:)
+    real(wp), allocatable :: z2(:), rows(:, :)
 
-    allocate (z2(view%model%body%n))
-    associate (places => view%model%body%points, operators => view%model%operators)
-      call operators%zero_energy_squared(view%state%displacement, &
-        view%state%deformation_gradient, z2)
-      values(1, :) = sqrt(z2(places) / operators%weight_sum(places)) / view%model%delta
+    associate (model => view%model, state => view%state)
+      allocate (z2(model%operators%n))
+      call model%operators%zero_energy_squared(state%displacement, state%displacement_gradient, z2)
+      rows = reshape(sqrt(z2 / model%operators%weight_sum) / model%delta, [size(z2), 1])
+      call take(model, rows, values)
     end associate
   end subroutine zero_energy
 
-  !> The values of a field of the state at some places.
-  subroutine take(places, field, values)
-    integer,  intent(in)  :: places(:)
-    real(wp), intent(in)  :: field(:, :)                    !! (n,components)
-    real(wp), intent(out), contiguous :: values(:, :)       !! (components,places)
+  !> The values of a field of the state at the points.
+  subroutine take(model, field, values)
+    type(model_t), intent(in) :: model
+    real(wp), intent(in)  :: field(:, :)                    !! (rows,components)
+    real(wp), intent(out), contiguous :: values(:, :)       !! (components,points)
     integer :: i
 
-    !$omp parallel do schedule(static) default(none) private(i) shared(places, values, field)
-    do i = 1, size(places)
-      values(:, i) = field(places(i), :)
+    !$omp parallel do schedule(static) default(none) private(i) shared(model, values, field)
+    do i = 1, size(values, 2)
+      values(:, i) = field(model%operators%storage%row(i), :)
     end do
     !$omp end parallel do
   end subroutine take
 
-  !> Cauchy stress at a place; 0 where det F is not positive.
-  pure function cauchy_or_zero(place, state) result(sigma)
-    integer,       intent(in) :: place
-    type(state_t), intent(in) :: state
-    real(wp) :: sigma(4)   !! xx yy zz xy [Pa]
-    real(wp) :: f(4), s(4)
+  !> Cauchy stress in the rows of the fields; 0 where det F is not positive.
+  function cauchy_stress(view) result(rows)
+    type(points_view_t), intent(in) :: view
+    real(wp), allocatable :: rows(:, :)   !! xx yy zz xy [Pa]
+    real(wp) :: in_block(n_block, 4)
+    integer  :: block, lo, hi
 
-    f = state%deformation_gradient(place, :)
-    s = state%stress(place, :)
-    sigma = 0.0_wp
-    if (determinant(f) > 0.0_wp) sigma = cauchy(f, s)
-  end function cauchy_or_zero
+    allocate (rows(view%model%operators%n, 4), source=0.0_wp)
+    !$omp parallel do schedule(static) default(none) private(block, lo, hi, in_block) &
+    !$omp shared(view, rows)
+    do block = 1, view%model%blocks%count
+      lo = view%model%blocks%lo(block)
+      hi = view%model%blocks%hi(block)
+      call view%model%materials%cauchy_block(block, view%state%displacement_gradient, &
+        view%state%stress, in_block)
+      rows(lo:hi, :) = in_block(:hi - lo + 1, :)
+    end do
+    !$omp end parallel do
+  end function cauchy_stress
 
 end module pd_frame_fields

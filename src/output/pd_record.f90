@@ -5,6 +5,7 @@ module pd_record
   use, intrinsic :: iso_fortran_env, only: compiler_version
   use pd_checkpoint, only: checkpoint_exists, checkpoint_t, read_checkpoint, remove_checkpoints, &
     write_checkpoint
+  use pd_clock, only: clock_t
   use pd_errors, only: error_list_t
   use pd_files, only: prepare_folder
   use pd_frame_fields, only: frame_fields
@@ -15,7 +16,8 @@ module pd_record
   use pd_input_types, only: input_t
   use pd_kinds, only: wp
   use pd_model, only: model_t
-  use pd_observe, only: column_t, ledger_t, moment_at, moment_t, observation_t, observe
+  use pd_ledger, only: ledger_t
+  use pd_observe, only: column_t, moment_at, moment_t, observation_t, observe
   use pd_progress, only: close_progress, open_progress, progress_t, say, show_progress, status_t
   use pd_result, only: add_row, create_result, finish_result, places_t, result_exists, result_t, &
     resume_result, write_failed_frame, write_frame, write_rows
@@ -43,8 +45,8 @@ module pd_record
     integer :: frames = 0                        !! written so far, 000000 among them
   end type record_t
 
-  character(*), parameter :: ledger_names(5) = [character(24) :: 'initial_kinetic_energy', &
-    'plastic_dissipation', 'damping_dissipation', 'external_work', 'largest_work']
+  character(*), parameter :: ledger_names(3) = [character(24) :: 'initial_kinetic_energy', &
+    'largest_work', 'outer_work']
 
 contains
 
@@ -56,7 +58,7 @@ contains
     if (.not. results_in_the_way) results_in_the_way = checkpoint_exists(stem)
   end function results_in_the_way
 
-  !> Open all outputs: anew, or behind a checkpoint (`step` > 0 or rows in the history).
+  !> Open all outputs: anew, or behind a checkpoint (rows in the history).
   !>
   !> Errors: a file cannot be written; on a restart, results that do not fit the checkpoint.
   subroutine open_record(input, command, threads, model, schedule, checkpoint, quiet, record, &
@@ -66,7 +68,7 @@ contains
     integer,            intent(in)    :: threads
     type(model_t),      intent(in)    :: model
     type(schedule_t),   intent(in)    :: schedule
-    type(checkpoint_t), intent(in)    :: checkpoint   !! history_rows 0: a new run
+    type(checkpoint_t), intent(in)    :: checkpoint   !! history_rows 0: a new run, but its clock
     logical,            intent(in)    :: quiet
     type(record_t),     intent(out)   :: record
     type(error_list_t), intent(inout) :: errors
@@ -78,14 +80,15 @@ contains
     restart = checkpoint%history_rows > 0
     call describe_run(input, command, threads, model, schedule, description)
     description%values = record%values
+    description%time_step = checkpoint%clock%time_step
     record%columns = description%columns
     call prepare_folder(input%run%output_dir, errors)
     if (errors%count() > 0) return
     if (restart) then
       call resume_result(record%result, record%stem, description, &
         places_t(checkpoint%frames_written, checkpoint%history_rows), &
-        places_t(count(schedule%frame_steps > checkpoint%step), &
-        rows_due(schedule, checkpoint%step)), checkpoint%step, errors)
+        places_t(count(schedule%frame_steps > checkpoint%clock%step), &
+        rows_due(schedule, checkpoint%clock%step)), checkpoint%clock%step, errors)
       if (errors%count() == 0) call resume_history(record%history, record%stem, record%columns, &
         checkpoint%history_rows, errors)
       record%frames = checkpoint%frames_written
@@ -123,15 +126,12 @@ contains
     description%horizon = model%delta
     description%lower = model%body%lower
     description%upper = model%body%upper
-    description%time_step = schedule%time_step
     description%steps = schedule%steps
-    associate (body => model%body, places => model%body%points)
-      description%position = body%position(places, :)
-      description%volume = body%volume(places)
-      description%boundary = body%boundary(places)
-      if (model%solid%material%plastic) &
-        description%yield_stress = model%solid%yield_stress(places)
-    end associate
+    description%position = model%body%position
+    description%volume = model%body%volume
+    description%boundary = model%body%boundary
+    if (size(model%materials%remembered()) > 0) &
+      description%yield_stress = model%strength(model%operators%storage%row)
     allocate (character(64) :: description%boundary_names(size(model%boundaries)))
     do k = 1, size(model%boundaries)
       description%boundary_names(k) = model%boundaries(k)%name
@@ -151,14 +151,14 @@ contains
   end subroutine close_record
 
   !> Observe the state after a step; what is seen stays in the record.
-  subroutine observe_state(model, state, ledger, step, record)
-    type(model_t),  intent(inout) :: model      !! work space of its operators
+  subroutine observe_state(model, state, ledger, clock, record)
+    type(model_t),  intent(in)    :: model
     type(state_t),  intent(in)    :: state
     type(ledger_t), intent(in)    :: ledger
-    integer,        intent(in)    :: step
+    type(clock_t),  intent(in)    :: clock
     type(record_t), intent(inout) :: record
 
-    record%moment = moment_at(step, model, state, ledger)
+    record%moment = moment_at(clock, model, state, ledger)
     call observe(record%columns, model, state, record%moment, record%seen)
   end subroutine observe_state
 
@@ -183,35 +183,35 @@ contains
   end subroutine record_frame
 
   !> Write the state of a run that has failed, marked as not valid.
-  subroutine record_failure(model, state, step, record, errors)
+  subroutine record_failure(model, state, clock, record, errors)
     type(model_t),      intent(in)    :: model
     type(state_t),      intent(in)    :: state
-    integer,            intent(in)    :: step
+    type(clock_t),      intent(in)    :: clock
     type(record_t),     intent(inout) :: record
     type(error_list_t), intent(inout) :: errors
 
-    call write_failed_frame(record%result, moment_at(step, model, state, ledger_t()), model, &
+    call write_failed_frame(record%result, moment_at(clock, model, state, ledger_t()), model, &
       state, errors)
   end subroutine record_failure
 
   !> Show where the run stands; axial stress and largest alpha are those of the last row.
-  subroutine record_progress(model, state, schedule, step, record, errors)
+  subroutine record_progress(model, state, schedule, clock, record, errors)
     type(model_t),      intent(in)    :: model
     type(state_t),      intent(in)    :: state
     type(schedule_t),   intent(in)    :: schedule
-    integer,            intent(in)    :: step
+    type(clock_t),      intent(in)    :: clock
     type(record_t),     intent(inout) :: record
     type(error_list_t), intent(inout) :: errors
     type(status_t) :: status
     type(moment_t) :: moment
 
-    status%step = step
+    status%step = clock%step
     status%steps = schedule%steps
-    status%time = real(step, wp) * schedule%time_step
+    status%time = clock%time()
     status%largest_alpha = record%seen%value('max_plastic_strain')
     if (model%platens%axis > 0) then
       status%has_strain = .true.
-      moment = moment_at(step, model, state, record%moment%ledger)
+      moment = moment_at(clock, model, state, record%moment%ledger)
       status%strain = moment%strain
       status%axial_stress = &
         model%boundaries(model%platens%first)%force(model%platens%axis) / model%platens%width
@@ -229,11 +229,11 @@ contains
   end subroutine record_line
 
   !> Write a checkpoint of the state after a step, and before it the rows that it counts.
-  subroutine save_checkpoint(model, state, ledger, step, record, errors)
+  subroutine save_checkpoint(model, state, ledger, clock, record, errors)
     type(model_t),      intent(in)    :: model
     type(state_t),      intent(in)    :: state
     type(ledger_t),     intent(in)    :: ledger
-    integer,            intent(in)    :: step
+    type(clock_t),      intent(in)    :: clock
     type(record_t),     intent(inout) :: record
     type(error_list_t), intent(inout) :: errors
     type(checkpoint_t) :: checkpoint
@@ -243,27 +243,26 @@ contains
     before = errors%count()
     call write_rows(record%result, errors)
     if (errors%count() > before) return
-    checkpoint%step = step
-    checkpoint%time_step = model%motion%time_step
-    checkpoint%time = real(step, wp) * checkpoint%time_step
+    checkpoint%clock = clock
     checkpoint%history_rows = record%history%rows
     checkpoint%frames_written = record%frames
     checkpoint%ledger_names = ledger_names
-    checkpoint%ledger = [ledger%initial_kinetic_energy, ledger%plastic_dissipation, &
-      ledger%damping_dissipation, ledger%external_work, ledger%largest_work]
+    checkpoint%ledger = [ledger%initial_kinetic_energy, ledger%largest_work, ledger%outer_work]
+    allocate (checkpoint%ledger_blocks(size(ledger%plastic), 3))
+    checkpoint%ledger_blocks(:, 1) = ledger%plastic
+    checkpoint%ledger_blocks(:, 2) = ledger%damping
+    checkpoint%ledger_blocks(:, 3) = ledger%frame_work
     checkpoint%input = record%values
-    associate (body => model%body, places => model%body%points)
-      checkpoint%position = body%position(places, :)
-      checkpoint%volume = body%volume(places)
-      checkpoint%boundary = body%boundary(places)
-      kept = state
-      call kept%gather(places)
-    end associate
+    checkpoint%position = model%body%position
+    checkpoint%volume = model%body%volume
+    checkpoint%boundary = model%body%boundary
+    kept = state
+    call kept%gather(model%operators%storage%row)
     call write_checkpoint(record%stem, checkpoint, kept, errors)
   end subroutine save_checkpoint
 
-  !> Read the newest checkpoint and compare its input with the present one. The state has the points
-  !> of the body, without voids.
+  !> Read the newest checkpoint and compare its input with the present one. The state has one row per
+  !> point.
   !>
   !> Errors, `file_errors`: no checkpoint that can be read; `input_errors`: values that differ.
   subroutine load_checkpoint(input, checkpoint, state, ledger, warning, file_errors, input_errors)
@@ -282,10 +281,11 @@ contains
       return
     end if
     ledger%initial_kinetic_energy = checkpoint%ledger(1)
-    ledger%plastic_dissipation = checkpoint%ledger(2)
-    ledger%damping_dissipation = checkpoint%ledger(3)
-    ledger%external_work = checkpoint%ledger(4)
-    ledger%largest_work = checkpoint%ledger(5)
+    ledger%largest_work = checkpoint%ledger(2)
+    ledger%outer_work = checkpoint%ledger(3)
+    ledger%plastic = checkpoint%ledger_blocks(:, 1)
+    ledger%damping = checkpoint%ledger_blocks(:, 2)
+    ledger%frame_work = checkpoint%ledger_blocks(:, 3)
     call compare_used(checkpoint%input, used_values(input), input_errors)
   end subroutine load_checkpoint
 
@@ -295,10 +295,10 @@ contains
     type(checkpoint_t), intent(in) :: checkpoint
     type(body_t),       intent(in) :: body
 
-    same = size(checkpoint%volume) == size(body%points)
-    if (same) same = all(abs(checkpoint%position - body%position(body%points, :)) <= 0.0_wp) &
-      .and. all(abs(checkpoint%volume - body%volume(body%points)) <= 0.0_wp) &
-      .and. all(checkpoint%boundary == body%boundary(body%points))
+    same = size(checkpoint%volume) == body%n
+    if (same) same = all(abs(checkpoint%position - body%position) <= 0.0_wp) &
+      .and. all(abs(checkpoint%volume - body%volume) <= 0.0_wp) &
+      .and. all(checkpoint%boundary == body%boundary)
   end function same_points
 
 end module pd_record

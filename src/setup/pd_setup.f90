@@ -5,23 +5,29 @@ module pd_setup
   use pd_bond_list, only: bond_list_t, new_bond_list
   use pd_boundary, only: boundary_t, control_by_force, mark_free, new_affine_boundary, new_ramp, &
     new_rigid_boundary, table_t, time_of_strain
+  use pd_clock, only: clock_t
   use pd_cloud, only: read_cloud
   use pd_errors, only: error_list_t
   use pd_families, only: horizon_t, new_horizon
-  use pd_force, only: control_stiffness
+  use pd_elastic, only: new_elastic
   use pd_geometry, only: body_t, lattice_body, lattice_t, layer_t, nearest_count, side_number
   use pd_input, only: resolved_path
-  use pd_input_types, only: boundary_input_t, input_t
+  use pd_green_lagrange, only: green_lagrange_t
+  use pd_input_types, only: boundary_input_t, input_t, material_input_t
   use pd_j2, only: new_j2
   use pd_kinds, only: is_set, wp
-  use pd_kinematics, only: inverse_shape_tensor
+  use pd_law, only: law_t
+  use pd_materials, only: divide_into_runs
+  use pd_measure, only: measure_t
+  use pd_shape_tensor, only: invert_shape_tensors
   use pd_lattice, only: lattice_operators_t, new_lattice_operators
-  use pd_model, only: find_highest_frequency, model_t
+  use pd_model, only: model_t
+  use pd_operators, only: control_stiffness
   use pd_pressure, only: spread_pressure, surface_vectors
   use pd_random_field, only: lognormal, longest_way, new_random_field, &
     standard_normal
   use pd_schedule, only: new_schedule, schedule_t
-  use pd_stability, only: wave_speed
+  use pd_stability, only: find_highest_frequency
   implicit none
   private
 
@@ -109,7 +115,6 @@ contains
       lattice%cells = d%layout == 'cells'
       lattice%tributary = d%volumes == 'tributary'
       lattice%rows = ceiling(d%horizon / d%spacing - 1.0e-6_wp)
-      lattice%with_voids = input%run%operators /= 'list'
     end associate
     do k = 1, size(layers)
       layers(k)%side = input%boundaries(k)%side
@@ -141,30 +146,31 @@ contains
     model%spacing = input%discretisation%spacing
     model%delta = input%discretisation%horizon
     horizon = new_horizon(model%delta, input%discretisation%influence)
-    call choose_operators(horizon, model, errors)
+    call choose_operators(horizon, input%run%operators, model, errors)
     if (errors%count() > 0) return
-    allocate (model%solid%k_inverse(model%body%n, 3))
-    call inverse_shape_tensor(model%operators, model%body%position, model%body%volume, &
-      model%solid%k_inverse, errors)
+    model%blocks = model%operators%domain%blocks
+    call set_up_points(model)
+    call invert_shape_tensors(model%operators, model%points%position, model%points%volume, errors)
     if (errors%count() > 0) return
-    call set_up_solid(input, model)
+    call set_up_materials(input, model)
     call set_up_boundaries(input, model)
     call set_up_pressures(input, model, errors)
-    if (.not. any(model%free > 0.0_wp)) call errors%add('no point is free to move')
+    if (.not. any(model%points%free > 0.0_wp)) call errors%add('no point is free to move')
   end subroutine set_up_model
 
-  !> Lattice operators for a body on a lattice (its places are then numbered with voids), the bond
-  !> list for any other.
-  subroutine choose_operators(horizon, model, errors)
+  !> Lattice operators for a body on a lattice, unless a list is asked for; the bond list for any
+  !> other.
+  subroutine choose_operators(horizon, form, model, errors)
     type(horizon_t),    intent(in)    :: horizon
+    character(*),       intent(in)    :: form   !! auto, lattice or list
     type(model_t),      intent(inout) :: model
     type(error_list_t), intent(inout) :: errors
     type(lattice_operators_t), allocatable :: lattice
     type(bond_list_t),         allocatable :: list
 
-    if (model%body%stride > 0) then
+    if (allocated(model%body%place) .and. form /= 'list') then
       allocate (lattice)
-      call new_lattice_operators(horizon, model%spacing, model%body%stride, model%body%volume, &
+      call new_lattice_operators(horizon, model%spacing, model%body%place, model%body%volume, &
         lattice)
       call move_alloc(lattice, model%operators)
     else
@@ -174,40 +180,82 @@ contains
     end if
   end subroutine choose_operators
 
-  !> Material, yield stress, zero-energy control.
-  subroutine set_up_solid(input, model)
-    type(input_t), intent(in)    :: input
+  !> What does not change at the points.
+  subroutine set_up_points(model)
     type(model_t), intent(inout) :: model
 
-    associate (m => input%material, solid => model%solid)
-      solid%density = m%density
-      solid%material = new_j2(m%youngs_modulus, m%poissons_ratio)
-      solid%material%plastic = m%model == 'j2'
-      solid%material%kinematic_modulus = m%kinematic_modulus
-      solid%material%isotropic_modulus = m%isotropic_modulus
-      solid%material%residual_strength = max(0.0_wp, m%residual_strength)
-      allocate (solid%yield_stress(model%body%n))
-      call set_up_yield_stress(input, model%body%position, solid%yield_stress)
+    associate (points => model%points, body => model%body, storage => model%operators%storage)
+      points%position = storage%spread(body%position)
+      points%volume = storage%spread(body%volume)
+      points%in_body = storage%spread(merge(1.0_wp, 0.0_wp, body%boundary == 0))
+      points%free = spread(storage%spread(spread(1.0_wp, 1, body%n)), 2, 2)
+      allocate (points%place(storage%rows), source=0.0_wp)
+    end associate
+  end subroutine set_up_points
+
+  !> Materials, initial strength, zero-energy control.
+  subroutine set_up_materials(input, model)
+    type(input_t), intent(in)    :: input
+    type(model_t), intent(inout) :: model
+    real(wp), allocatable :: strength(:)
+
+    allocate (model%materials%list(1))
+    associate (m => input%material, material => model%materials%list(1))
+      material%name = 'material'
+      material%density = m%density
+      material%youngs_modulus = m%youngs_modulus
+      allocate (material%measure, source=new_measure(m%strain_measure))
+      allocate (material%law, source=new_law(m))
+      call divide_into_runs(model%blocks, &
+        model%operators%storage%spread(spread(1, 1, model%body%n)), model%materials)
+      allocate (strength(model%body%n))
+      call set_up_strength(input, model%body%position, strength)
+      model%strength = model%operators%storage%spread(strength)
       if (input%stabilisation%method == 'silling') call set_up_control( &
         input%stabilisation%factor, m%youngs_modulus, model)
     end associate
-  end subroutine set_up_solid
+  end subroutine set_up_materials
 
-  !> Control of zero-energy modes after Silling.
+  !> The law of a material.
+  pure function new_law(given) result(law)
+    type(material_input_t), intent(in) :: given
+    class(law_t), allocatable :: law
+
+    select case (given%model)
+    case ('elastic')
+      allocate (law, source=new_elastic(given%youngs_modulus, given%poissons_ratio))
+    case ('j2')
+      allocate (law, source=new_j2(given%youngs_modulus, given%poissons_ratio, &
+        given%kinematic_modulus, given%isotropic_modulus, max(0.0_wp, given%residual_strength)))
+    end select
+  end function new_law
+
+  !> The strain measure of a material.
+  pure function new_measure(name) result(measure)
+    character(*), intent(in) :: name
+    class(measure_t), allocatable :: measure
+
+    select case (name)
+    case ('green_lagrange')
+      allocate (green_lagrange_t :: measure)
+    end select
+  end function new_measure
+
+  !> Control of zero-energy modes after Silling: c_i = g C_0 / W_i with C_0 = 48 E / (5 pi delta^2).
   subroutine set_up_control(factor, youngs_modulus, model)
     real(wp),      intent(in)    :: factor           !! g
     real(wp),      intent(in)    :: youngs_modulus   !! E [Pa]
     type(model_t), intent(inout) :: model
     real(wp), allocatable :: c(:)
 
-    allocate (c(model%body%n), source=control_stiffness(factor, youngs_modulus, model%delta, &
+    allocate (c(model%operators%n), source=control_stiffness(factor, youngs_modulus, model%delta, &
       model%operators%weight_sum))
-    where (model%body%boundary < 0) c = 0.0_wp
+    where (model%points%volume <= 0.0_wp) c = 0.0_wp
     call model%operators%set_control(c)
   end subroutine set_up_control
 
   !> sigma_y0 of every point: the same everywhere or a random field, reduced in the weak patch.
-  subroutine set_up_yield_stress(input, position, yield_stress)
+  subroutine set_up_strength(input, position, yield_stress)
     type(input_t), intent(in)  :: input
     real(wp),      intent(in),  contiguous :: position(:, :)    !! X (n,2) [m]
     real(wp),      intent(out), contiguous :: yield_stress(:)   !! (n) [Pa]
@@ -227,7 +275,7 @@ contains
           yield_stress(i) = (1.0_wp - flaw%amplitude) * yield_stress(i)
       end do
     end associate
-  end subroutine set_up_yield_stress
+  end subroutine set_up_strength
 
   !> Boundaries with their motions, platens, damping.
   subroutine set_up_boundaries(input, model)
@@ -239,17 +287,13 @@ contains
     do k = 1, size(input%boundaries)
       model%boundaries(k) = new_boundary(input%boundaries, k, model%body)
     end do
-    allocate (model%free(model%body%n, 2))
-    call mark_free(model%body%position, model%body%volume, input%material%density, &
-      model%boundaries, model%free)
-    do k = 1, 2
-      where (model%body%boundary < 0) model%free(:, k) = 0.0_wp
+    do k = 1, size(model%boundaries)
+      model%boundaries(k)%points = model%operators%storage%row(model%boundaries(k)%points)
     end do
+    call mark_free(model%points%position, model%points%volume, input%material%density, &
+      model%boundaries, model%points%free)
 
-    model%motion%density = input%material%density
-    model%motion%damping = input%integration%damping
-    model%motion%first = model%operators%first_point
-    model%motion%last = model%operators%last_point
+    model%damping = input%integration%damping
     if (input%platens(1) == 0) return
     associate (p => model%platens, body => model%body)
       p%first = input%platens(1)
@@ -258,9 +302,8 @@ contains
       p%start = body%lower(p%axis)
       p%length = body%upper(p%axis) - body%lower(p%axis)
       p%width = body%upper(3 - p%axis) - body%lower(3 - p%axis)
-      model%motion%axis = p%axis
-      model%motion%start = p%start
-      model%motion%length = p%length
+      model%points%place = min(1.0_wp, max(0.0_wp, (model%points%position(:, p%axis) - p%start) &
+        / p%length))
     end associate
     model%damped_in_frame = input%integration%damping_frame == 'platens'
   end subroutine set_up_boundaries
@@ -275,8 +318,9 @@ contains
 
     allocate (model%pressures(size(input%pressures)))
     if (size(input%pressures) == 0) return
-    allocate (vectors(model%body%n, 2), source=0.0_wp)
-    call surface_vectors(model%operators, model%body%volume, model%solid%k_inverse, vectors)
+    allocate (vectors(model%operators%n, 2), source=0.0_wp)
+    call surface_vectors(model%operators, model%points%volume, vectors)
+    vectors = vectors(model%operators%storage%row, :)
     depth = 2 * ceiling(model%delta / model%spacing - 1.0e-6_wp)   ! families that touch cut ones
     do k = 1, size(input%pressures)
       associate (given => input%pressures(k), pressure => model%pressures(k))
@@ -286,6 +330,7 @@ contains
         if (size(given%span) > 0) pressure%span = given%span
         pressure%factor = new_ramp(given%ramp_time)
         call spread_pressure(model%body, model%boundaries, vectors, model%spacing, depth, pressure)
+        pressure%points = model%operators%storage%row(pressure%points)
         if (size(pressure%points) == 0) &
           call errors%add('a pressure acts on no point', '&pressure name = '//given%name)
       end associate
@@ -372,11 +417,11 @@ contains
 
   !> Time step by the rule asked for, and the steps of the run, its frames and rows.
   !>
-  !> `time_step`: that of a checkpoint; 0: by the rule.
+  !> `clock`: in: that of a checkpoint; with a time step of 0 the rule decides.
   !> Errors: a run with too many steps, a strain that is never reached.
-  subroutine set_up_schedule(input, time_step, model, schedule, errors)
+  subroutine set_up_schedule(input, clock, model, schedule, errors)
     type(input_t),      intent(in)    :: input
-    real(wp),           intent(in)    :: time_step   !! [s]
+    type(clock_t),      intent(inout) :: clock
     type(model_t),      intent(inout) :: model
     type(schedule_t),   intent(out)   :: schedule
     type(error_list_t), intent(inout) :: errors
@@ -384,15 +429,14 @@ contains
     real(wp) :: end_time
     integer  :: k
 
-    associate (given => input%integration, dt => model%motion%time_step)
-      dt = time_step
+    associate (given => input%integration, dt => clock%time_step)
       if (dt <= 0.0_wp) then
         select case (given%time_step_rule)
         case ('fixed')
           dt = given%time_step
         case ('courant')
-          dt = given%safety * model%spacing / wave_speed(model%solid)
-        case default
+          dt = given%safety * model%spacing / model%materials%wave_speed()
+        case ('spectral')
           call find_highest_frequency(model)
           dt = given%safety * 2.0_wp / model%highest_frequency
         end select
@@ -420,7 +464,7 @@ contains
       call errors%add('a frame is asked for after the end of the run', '&output')
       return
     end if
-    call new_schedule(model%motion%time_step, end_time, input%output%history_count, frame_times, &
+    call new_schedule(clock%time_step, end_time, input%output%history_count, frame_times, &
       schedule, errors)
 
   contains

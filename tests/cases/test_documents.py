@@ -54,7 +54,7 @@ def test_make_targets_that_are_named_exist():
 
 
 def test_post_processing_commands_that_are_named_exist():
-    source = (ROOT / "postproc" / "perigeo_post" / "cli.py").read_text()
+    source = (ROOT / "postproc" / "perigeo_post" / "cli" / "command_line.py").read_text()
     table = re.search(r"^COMMANDS\b.*?^\}", source, re.M | re.S).group()
     commands = set(re.findall(r'^    "(\w+)":', table, re.M))
     assert "contours" in commands

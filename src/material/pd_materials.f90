@@ -1,0 +1,288 @@
+!> The materials of a body: which rows of the fields belong to which, and law and strain measure
+!> applied to a block of rows.
+!>
+!> A block is divided into runs of rows of one material. Where a body has one material a block is
+!> one run, and its law works on it directly; where materials meet it works on each run in turn.
+!> Source: doc/theory.md, sections 2 and 3.
+module pd_materials
+  use pd_blocks, only: blocks_t
+  use pd_elastic, only: isotropic_stress_block
+  use pd_kinds, only: n_block, wp
+  use pd_labels, only: label_t
+  use pd_law, only: flow_t, law_points_t, law_t
+  use pd_measure, only: measure_t, small_strain_block
+  use pd_tensors, only: determinant
+  implicit none
+  private
+
+  public :: material_t, materials_t, run_t, divide_into_runs
+
+  !> One material. Its strength belongs to the points.
+  type :: material_t
+    character(:), allocatable :: name
+    class(law_t), allocatable :: law
+    class(measure_t), allocatable :: measure
+    real(wp) :: density = 0.0_wp          !! rho [kg/m^3]
+    real(wp) :: youngs_modulus = 0.0_wp   !! E [Pa]
+  end type material_t
+
+  !> Rows of one block that have one material.
+  type :: run_t
+    integer :: lo = 1, hi = 0
+    integer :: material = 1
+  end type run_t
+
+  type :: materials_t
+    type(material_t), allocatable :: list(:)
+    type(run_t),      allocatable :: runs(:)
+    integer,          allocatable :: first_run(:)   !! of each block, and one past the last (blocks+1)
+  contains
+    procedure :: remembered
+    procedure :: stress_block
+    procedure :: linear_stress_block
+    procedure :: strain_block
+    procedure :: first_piola_block
+    procedure :: cauchy_block
+    procedure :: energy_block
+    procedure :: plastic_strain_block
+    procedure :: density_block
+    procedure :: wave_speed
+    procedure :: density_of
+  end type materials_t
+
+contains
+
+  !> Divide the blocks into runs.
+  subroutine divide_into_runs(blocks, material_of, materials)
+    type(blocks_t), intent(in) :: blocks
+    integer,        intent(in) :: material_of(:)     !! (n)
+    type(materials_t), intent(inout) :: materials
+    integer :: block, i, n, pass
+
+    allocate (materials%first_run(blocks%count + 1))
+    do pass = 1, 2   ! count, then fill
+      n = 0
+      do block = 1, blocks%count
+        materials%first_run(block) = n + 1
+        do i = blocks%lo(block), blocks%hi(block)
+          if (i == blocks%lo(block)) then
+            n = n + 1
+          else if (material_of(i) /= material_of(i - 1)) then
+            n = n + 1
+          else if (pass == 2) then
+            materials%runs(n)%hi = i
+          end if
+          if (pass == 1) cycle
+          if (materials%runs(n)%hi < i) materials%runs(n) = run_t(i, i, material_of(i))
+        end do
+      end do
+      materials%first_run(blocks%count + 1) = n + 1
+      if (pass == 1) allocate (materials%runs(n))
+    end do
+  end subroutine divide_into_runs
+
+  !> Columns of the history: those of the law that remembers most. Where laws differ, a column of
+  !> another law has another meaning, and the name of both.
+  pure function remembered(self) result(columns)
+    class(materials_t), intent(in) :: self
+    type(label_t), allocatable :: columns(:), more(:)
+    integer :: c, k
+
+    columns = self%list(1)%law%remembers()
+    do k = 2, size(self%list)
+      more = self%list(k)%law%remembers()
+      do c = 1, min(size(columns), size(more))
+        if (columns(c)%name == more(c)%name) cycle
+        columns(c) = label_t(trim(columns(c)%name)//'_or_'//trim(more(c)%name), '1', &
+          trim(columns(c)%description)//', or '//trim(more(c)%description))
+      end do
+      if (size(more) > size(columns)) columns = [columns, more(size(columns) + 1:)]
+    end do
+  end function remembered
+
+  !> From H to the first Piola stress of a block: strain, law, and the stress conjugate to it. The
+  !> history goes from step n to n+1.
+  !>
+  !> `dissipated`: work of the stress on the plastic strain [J/m].
+  pure subroutine stress_block(self, block, volume, h, points, p, dissipated)
+    class(materials_t), intent(in) :: self
+    integer,  intent(in) :: block
+    real(wp), intent(in), contiguous :: volume(:)   !! V (n) [m^2]
+    real(wp), intent(in), contiguous :: h(:, :)     !! H (n,4) xx xy yx yy
+    type(law_points_t), intent(inout) :: points
+    real(wp), intent(inout) :: p(n_block, 4)        !! out: P xx xy yx yy [Pa]
+    real(wp), intent(out)   :: dissipated
+    real(wp)     :: strain(n_block, 4)
+    type(flow_t) :: flow
+    integer      :: first, i, k
+
+    dissipated = 0.0_wp
+    first = self%runs(self%first_run(block))%lo
+    do k = self%first_run(block), self%first_run(block + 1) - 1
+      associate (run => self%runs(k), material => self%list(self%runs(k)%material))
+        call material%measure%strain_block(first, run%lo, run%hi, h, strain)
+        call material%law%stress_block(first, run%lo, run%hi, strain, points, flow)
+        do i = 1, flow%n
+          dissipated = dissipated + volume(flow%rows(i)) * flow%dissipated(i)
+        end do
+        call material%measure%first_piola_block(first, run%lo, run%hi, h, points%stress, p)
+      end associate
+    end do
+  end subroutine stress_block
+
+  !> First Piola stress of a small displacement of the unloaded elastic body.
+  pure subroutine linear_stress_block(self, block, h, p)
+    class(materials_t), intent(in) :: self
+    integer,  intent(in) :: block
+    real(wp), intent(in), contiguous :: h(:, :)   !! H (n,4) xx xy yx yy
+    real(wp), intent(inout) :: p(n_block, 4)      !! out: P xx xy yx yy [Pa]
+    real(wp) :: strain(n_block, 4), stress(n_block, 4), lambda, shear_modulus
+    integer  :: first, from, to, k
+
+    first = self%runs(self%first_run(block))%lo
+    do k = self%first_run(block), self%first_run(block + 1) - 1
+      associate (run => self%runs(k))
+        call self%list(run%material)%law%lame_constants(lambda, shear_modulus)
+        call small_strain_block(first, run%lo, run%hi, h, strain)
+        call isotropic_stress_block(lambda, shear_modulus, first, run%lo, run%hi, strain, stress)
+        from = run%lo - first + 1
+        to = run%hi - first + 1
+        p(from:to, 1) = stress(from:to, 1)
+        p(from:to, 2) = stress(from:to, 4)
+        p(from:to, 3) = stress(from:to, 4)
+        p(from:to, 4) = stress(from:to, 2)
+      end associate
+    end do
+  end subroutine linear_stress_block
+
+  !> Stored elastic energy per volume of the rows of a block.
+  pure subroutine energy_block(self, block, points, energy)
+    class(materials_t), intent(in) :: self
+    integer,            intent(in) :: block
+    type(law_points_t), intent(in) :: points
+    real(wp), intent(inout) :: energy(n_block)   !! out: [J/m^3]
+    integer :: k
+
+    do k = self%first_run(block), self%first_run(block + 1) - 1
+      associate (run => self%runs(k))
+        call self%list(run%material)%law%energy_block( &
+          self%runs(self%first_run(block))%lo, run%lo, run%hi, points, energy)
+      end associate
+    end do
+  end subroutine energy_block
+
+  !> Strain of the rows of a block.
+  pure subroutine strain_block(self, block, h, strain)
+    class(materials_t), intent(in) :: self
+    integer,  intent(in) :: block
+    real(wp), intent(in), contiguous :: h(:, :)   !! H (n,4) xx xy yx yy
+    real(wp), intent(inout) :: strain(n_block, 4) !! out: E xx yy zz xy
+    integer :: first, k
+
+    first = self%runs(self%first_run(block))%lo
+    do k = self%first_run(block), self%first_run(block + 1) - 1
+      associate (run => self%runs(k))
+        call self%list(run%material)%measure%strain_block(first, run%lo, run%hi, h, strain)
+      end associate
+    end do
+  end subroutine strain_block
+
+  !> First Piola stress of the rows of a block.
+  pure subroutine first_piola_block(self, block, h, stress, p)
+    class(materials_t), intent(in) :: self
+    integer,  intent(in) :: block
+    real(wp), intent(in), contiguous :: h(:, :)        !! H (n,4) xx xy yx yy
+    real(wp), intent(in), contiguous :: stress(:, :)   !! conjugate stress (n,4) xx yy zz xy [Pa]
+    real(wp), intent(inout) :: p(n_block, 4)           !! out: P xx xy yx yy [Pa]
+    integer :: first, k
+
+    first = self%runs(self%first_run(block))%lo
+    do k = self%first_run(block), self%first_run(block + 1) - 1
+      associate (run => self%runs(k))
+        call self%list(run%material)%measure%first_piola_block(first, run%lo, run%hi, h, stress, p)
+      end associate
+    end do
+  end subroutine first_piola_block
+
+  !> Cauchy stress of the rows of a block; 0 where det F is not positive.
+  pure subroutine cauchy_block(self, block, h, stress, sigma)
+    class(materials_t), intent(in) :: self
+    integer,  intent(in) :: block
+    real(wp), intent(in), contiguous :: h(:, :)        !! H (n,4) xx xy yx yy
+    real(wp), intent(in), contiguous :: stress(:, :)   !! conjugate stress (n,4) xx yy zz xy [Pa]
+    real(wp), intent(inout) :: sigma(n_block, 4)       !! out: xx yy zz xy [Pa]
+    integer :: first, i, k
+
+    first = self%runs(self%first_run(block))%lo
+    do k = self%first_run(block), self%first_run(block + 1) - 1
+      associate (run => self%runs(k), measure => self%list(self%runs(k)%material)%measure)
+        do i = run%lo, run%hi
+          sigma(i - first + 1, :) = 0.0_wp
+          if (determinant(h(i, :)) > 0.0_wp) &
+            sigma(i - first + 1, :) = measure%cauchy(h(i, :), stress(i, :))
+        end do
+      end associate
+    end do
+  end subroutine cauchy_block
+
+  !> Equivalent plastic strain of the rows of a block; 0 where a law has none.
+  pure subroutine plastic_strain_block(self, block, points, values)
+    class(materials_t), intent(in) :: self
+    integer,            intent(in) :: block
+    type(law_points_t), intent(in) :: points
+    real(wp), intent(inout) :: values(n_block)   !! out
+    integer :: column, first, k
+
+    first = self%runs(self%first_run(block))%lo
+    do k = self%first_run(block), self%first_run(block + 1) - 1
+      associate (run => self%runs(k))
+        column = self%list(run%material)%law%plastic_strain
+        values(run%lo - first + 1:run%hi - first + 1) = 0.0_wp
+        if (column > 0) values(run%lo - first + 1:run%hi - first + 1) = &
+          points%history(run%lo:run%hi, column)
+      end associate
+    end do
+  end subroutine plastic_strain_block
+
+  !> Density of the rows of a block.
+  pure subroutine density_block(self, block, density)
+    class(materials_t), intent(in) :: self
+    integer,  intent(in)    :: block
+    real(wp), intent(inout) :: density(n_block)   !! out: rho [kg/m^3]
+    integer :: first, k
+
+    first = self%runs(self%first_run(block))%lo
+    do k = self%first_run(block), self%first_run(block + 1) - 1
+      associate (run => self%runs(k))
+        density(run%lo - first + 1:run%hi - first + 1) = self%list(run%material)%density
+      end associate
+    end do
+  end subroutine density_block
+
+  !> Largest c_p = sqrt((lambda + 2 G) / rho) of any material [m/s].
+  pure real(wp) function wave_speed(self) result(fastest)
+    class(materials_t), intent(in) :: self
+    real(wp) :: lambda, shear_modulus
+    integer  :: k
+
+    fastest = 0.0_wp
+    do k = 1, size(self%list)
+      call self%list(k)%law%lame_constants(lambda, shear_modulus)
+      fastest = max(fastest, sqrt((lambda + 2.0_wp * shear_modulus) / self%list(k)%density))
+    end do
+  end function wave_speed
+
+  !> Density of every row; that of the first material outside of the blocks.
+  pure function density_of(self, n) result(density)
+    class(materials_t), intent(in) :: self
+    integer,            intent(in) :: n
+    real(wp) :: density(n)   !! rho [kg/m^3]
+    integer  :: k
+
+    density = self%list(1)%density
+    do k = 1, size(self%runs)
+      density(self%runs(k)%lo:self%runs(k)%hi) = self%list(self%runs(k)%material)%density
+    end do
+  end function density_of
+
+end module pd_materials

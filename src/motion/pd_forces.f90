@@ -1,0 +1,158 @@
+!> The forces of a state: what every integrator asks for.
+!>
+!>   u gives H, H gives strain, stress and P; the operators turn P into f; loads and supports join
+!>
+!> One block of points after the other: what a block has written is in the cache where it is needed
+!> next.
+!> Source: doc/theory.md, sections 2 to 5 and 7.
+module pd_forces
+  use pd_boundary, only: boundary_forces
+  use pd_kinds, only: n_block, wp
+  use pd_loads, only: apply_loads
+  use pd_materials, only: materials_t
+  use pd_model, only: model_t
+  use pd_operators, only: operators_t
+  use pd_state, only: block_work_t, state_t
+  use pd_timing, only: kernel_boundaries, kernel_force, kernel_gradient, now, timing_t
+  implicit none
+  private
+
+  public :: forces, internal_forces, linear_forces
+
+contains
+
+  !> Forces at time t: internal ones, loads, and the reactions of the supports. Stress and history of
+  !> the state go from step n to n+1.
+  !>
+  !> `work`: what each block has dissipated in this step.
+  !> `failed_row`: 0, or the first row whose det F is not positive (NaN included).
+  subroutine forces(model, t, state, work, timing, failed_row)
+    type(model_t),      intent(inout) :: model   !! its boundaries get their new forces
+    real(wp),           intent(in)    :: t       !! [s]
+    type(state_t),      intent(inout) :: state
+    type(block_work_t), intent(inout) :: work
+    type(timing_t),     intent(inout) :: timing
+    integer,            intent(out)   :: failed_row
+
+    associate (points => model%points)
+      call internal_forces(model%operators, model%materials, points%volume, state, work, timing, &
+        failed_row)
+      call apply_loads(model%pressures, model%boundaries, points%volume, t, state%force)
+      call boundary_forces(points%position, points%volume, t, state%force, model%boundaries)
+    end associate
+    call timing%lap(kernel_boundaries)
+  end subroutine forces
+
+  !> Internal force density, the zero-energy control included.
+  subroutine internal_forces(operators, materials, volume, state, work, timing, failed_row)
+    class(operators_t), intent(inout) :: operators
+    type(materials_t),  intent(in)    :: materials
+    real(wp),           intent(in), contiguous :: volume(:)   !! V (n) [m^2]
+    type(state_t),      intent(inout) :: state
+    type(block_work_t), intent(inout) :: work
+    type(timing_t),     intent(inout) :: timing
+    integer,            intent(out)   :: failed_row
+    integer :: block, n_blocks
+
+    n_blocks = operators%domain%blocks%count
+    call work%fit(operators%domain%blocks)
+    call operators%take_in(state%displacement)
+    !$omp parallel do schedule(static) default(none) private(block) &
+    !$omp shared(n_blocks, operators, materials, volume, state, work, timing)
+    do block = 1, n_blocks
+      call stress_of_block(block, operators, materials, volume, state, work, timing%blocks)
+    end do
+    !$omp end parallel do
+    failed_row = operators%domain%blocks%lowest_number(work%failed)
+    call timing%lap_blocks(kernel_gradient, work%times)
+    call operators%share()
+    !$omp parallel do schedule(static) default(none) private(block) &
+    !$omp shared(n_blocks, operators, state)
+    do block = 1, n_blocks
+      call operators%force_block(operators%domain%blocks%lo(block), &
+        operators%domain%blocks%hi(block), state%displacement, state%force)
+    end do
+    !$omp end parallel do
+    call timing%lap(kernel_force)
+  end subroutine internal_forces
+
+  !> H, stress and force tensor of one block.
+  subroutine stress_of_block(block, operators, materials, volume, state, work, timed)
+    integer,            intent(in)    :: block
+    class(operators_t), intent(inout) :: operators
+    type(materials_t),  intent(in)    :: materials
+    real(wp),           intent(in), contiguous :: volume(:)
+    type(state_t),      intent(inout) :: state
+    type(block_work_t), intent(inout) :: work
+    logical,            intent(in)    :: timed
+    real(wp) :: p(n_block, 4)
+    integer  :: lo, hi
+
+    lo = operators%domain%blocks%lo(block)
+    hi = operators%domain%blocks%hi(block)
+    work%dissipated(block) = 0.0_wp
+    if (timed) work%times(1, block) = now()
+    call operators%gradient_block(lo, hi, state%displacement, state%displacement_gradient)
+    if (timed) work%times(2, block) = now()
+    work%failed(block) = first_inverted(lo, hi, state%displacement_gradient)
+    if (work%failed(block) == 0) then
+      call materials%stress_block(block, volume, state%displacement_gradient, state%law_points_t, &
+        p, work%dissipated(block))
+      call operators%hand_over_block(lo, hi, state%displacement_gradient, p)
+    end if
+    if (timed) work%times(3, block) = now()
+  end subroutine stress_of_block
+
+  !> The first of the rows lo to hi whose det F is not positive (NaN included); 0: none.
+  pure integer function first_inverted(lo, hi, h) result(row)
+    integer,  intent(in) :: lo, hi
+    real(wp), intent(in), contiguous :: h(:, :)   !! H (n,4)
+    integer :: i, n_bad
+
+    n_bad = 0
+    !$omp simd reduction(+:n_bad)
+    do i = lo, hi
+      if (.not. (1.0_wp + h(i, 1)) * (1.0_wp + h(i, 4)) - h(i, 2) * h(i, 3) > 0.0_wp) &
+        n_bad = n_bad + 1
+    end do
+    row = 0
+    if (n_bad == 0) return
+    do i = hi, lo, -1
+      if (.not. (1.0_wp + h(i, 1)) * (1.0_wp + h(i, 4)) - h(i, 2) * h(i, 3) > 0.0_wp) row = i
+    end do
+  end function first_inverted
+
+  !> Internal force of a small displacement of the unloaded elastic body: the linearised operator,
+  !> control included.
+  subroutine linear_forces(operators, materials, u, h, f)
+    class(operators_t), intent(inout) :: operators
+    type(materials_t),  intent(in)    :: materials
+    real(wp), intent(inout), contiguous :: u(:, :)   !! (n,2) [m]; its halo is brought up to date
+    real(wp), intent(inout), contiguous :: h(:, :)   !! work space (n,4)
+    real(wp), intent(inout), contiguous :: f(:, :)   !! out: (n,2) [N/m^3]
+    real(wp) :: p(n_block, 4)
+    integer  :: block, lo, hi, n_blocks
+
+    n_blocks = operators%domain%blocks%count
+    call operators%take_in(u)
+    !$omp parallel do schedule(static) default(none) private(block, lo, hi, p) &
+    !$omp shared(n_blocks, operators, materials, u, h)
+    do block = 1, n_blocks
+      lo = operators%domain%blocks%lo(block)
+      hi = operators%domain%blocks%hi(block)
+      call operators%gradient_block(lo, hi, u, h)
+      call materials%linear_stress_block(block, h, p)
+      call operators%hand_over_block(lo, hi, h, p)
+    end do
+    !$omp end parallel do
+    call operators%share()
+    !$omp parallel do schedule(static) default(none) private(block) &
+    !$omp shared(n_blocks, operators, u, f)
+    do block = 1, n_blocks
+      call operators%force_block(operators%domain%blocks%lo(block), &
+        operators%domain%blocks%hi(block), u, f)
+    end do
+    !$omp end parallel do
+  end subroutine linear_forces
+
+end module pd_forces

@@ -1,0 +1,87 @@
+!> Work and dissipation, added up step by step.
+!>
+!> What the points do is kept per block, and added over the blocks when somebody asks: an ordinary
+!> step takes no sum over all points.
+!> Source: doc/theory.md, section 10.
+module pd_ledger
+  use pd_blocks, only: blocks_t
+  use pd_kinds, only: wp
+  implicit none
+  private
+
+  public :: ledger_t, new_ledger
+
+  type :: ledger_t
+    real(wp) :: initial_kinetic_energy = 0.0_wp         !! [J/m]
+    real(wp) :: largest_work = 0.0_wp                   !! largest |W| that was asked for [J/m]
+    real(wp) :: outer_work = 0.0_wp                     !! of supports and loads [J/m]
+    real(wp), allocatable :: plastic(:)                 !! dissipated by flow (blocks) [J/m]
+    real(wp), allocatable :: damping(:)                 !! dissipated by damping (blocks) [J/m]
+    real(wp), allocatable :: frame_work(:)              !! of who moves the damping's frame (blocks)
+  contains
+    procedure :: plastic_dissipation
+    procedure :: damping_dissipation
+    procedure :: external_work
+    procedure :: note_work
+    procedure :: fit
+  end type ledger_t
+
+contains
+
+  !> Nothing done yet.
+  pure type(ledger_t) function new_ledger(blocks) result(ledger)
+    type(blocks_t), intent(in) :: blocks
+
+    allocate (ledger%plastic(blocks%count), ledger%damping(blocks%count), &
+      ledger%frame_work(blocks%count), source=0.0_wp)
+  end function new_ledger
+
+  !> Dissipated by plastic flow so far [J/m].
+  pure real(wp) function plastic_dissipation(self, blocks)
+    class(ledger_t), intent(in) :: self
+    type(blocks_t),  intent(in) :: blocks
+
+    plastic_dissipation = blocks%total(self%plastic)
+  end function plastic_dissipation
+
+  !> Dissipated by the damping so far [J/m].
+  pure real(wp) function damping_dissipation(self, blocks)
+    class(ledger_t), intent(in) :: self
+    type(blocks_t),  intent(in) :: blocks
+
+    damping_dissipation = blocks%total(self%damping)
+  end function damping_dissipation
+
+  !> Work from outside so far, W [J/m].
+  pure real(wp) function external_work(self, blocks)
+    class(ledger_t), intent(in) :: self
+    type(blocks_t),  intent(in) :: blocks
+
+    external_work = self%outer_work + blocks%total(self%frame_work)
+  end function external_work
+
+  !> Keep the sums in so many blocks: those of a run with another division go into the first one.
+  pure subroutine fit(self, blocks)
+    class(ledger_t), intent(inout) :: self
+    type(blocks_t),  intent(in)    :: blocks
+    type(ledger_t) :: fitting
+
+    if (size(self%plastic) == blocks%count) return
+    fitting = new_ledger(blocks)
+    fitting%plastic(1) = sum(self%plastic)
+    fitting%damping(1) = sum(self%damping)
+    fitting%frame_work(1) = sum(self%frame_work)
+    self%plastic = fitting%plastic
+    self%damping = fitting%damping
+    self%frame_work = fitting%frame_work
+  end subroutine fit
+
+  !> Remember the largest work that was ever done.
+  pure subroutine note_work(self, blocks)
+    class(ledger_t), intent(inout) :: self
+    type(blocks_t),  intent(in)    :: blocks
+
+    self%largest_work = max(self%largest_work, abs(self%external_work(blocks)))
+  end subroutine note_work
+
+end module pd_ledger

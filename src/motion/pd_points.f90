@@ -1,0 +1,18 @@
+!> What does not change at the points, in the rows of the fields.
+module pd_points
+  use pd_kinds, only: wp
+  implicit none
+  private
+
+  public :: points_t
+
+  !> A row without a point has volume 0, is not free, and does not belong to the body.
+  type :: points_t
+    real(wp), allocatable :: position(:, :)   !! X (n,2) [m]
+    real(wp), allocatable :: volume(:)        !! V (n) [m^2]
+    real(wp), allocatable :: free(:, :)       !! 1: moves freely, 0: prescribed component (n,2)
+    real(wp), allocatable :: place(:)         !! between the ends of the damping's frame, 0 to 1 (n)
+    real(wp), allocatable :: in_body(:)       !! 1: body, 0: fictitious point (n)
+  end type points_t
+
+end module pd_points

@@ -1,0 +1,59 @@
+!> Shape tensors: K of every family, and its inverse, which the operators keep.
+!>
+!> Source: doc/theory.md, section 2.
+module pd_shape_tensor
+  use pd_errors, only: error_list_t
+  use pd_kinds, only: wp
+  use pd_operators, only: operators_t
+  implicit none
+  private
+
+  public :: invert_shape_tensors
+
+contains
+
+  !> K^-1 of every point, kept in the operators; zero in rows without a point (volume 0).
+  !>
+  !> Errors: a family with too few bonds or (nearly) on one line: condition number of K, a
+  !> scale-free number, over 1e6. The first few such points are named with their positions.
+  subroutine invert_shape_tensors(operators, position, volume, errors)
+    class(operators_t), intent(inout) :: operators
+    real(wp),           intent(in), contiguous :: position(:, :)   !! X (n,2) [m]
+    real(wp),           intent(in), contiguous :: volume(:)        !! V (n) [m^2]
+    type(error_list_t), intent(inout) :: errors
+    real(wp), parameter :: largest_condition = 1.0e6_wp
+    integer,  parameter :: most_reported = 10
+    real(wp), allocatable :: k(:, :)
+    real(wp) :: mean, radius, determinant
+    character(160) :: text
+    integer  :: i, n_singular
+
+    allocate (k(operators%n, 3))
+    call operators%shape_tensor(k)
+    allocate (operators%k_inverse(operators%n, 3), source=0.0_wp)
+    n_singular = 0
+    do i = 1, operators%n
+      if (volume(i) <= 0.0_wp) cycle
+      mean = 0.5_wp * (k(i, 1) + k(i, 2))
+      radius = sqrt((0.5_wp * (k(i, 1) - k(i, 2)))**2 + k(i, 3)**2)
+      determinant = k(i, 1) * k(i, 2) - k(i, 3)**2
+      if (determinant > 0.0_wp .and. mean + radius < largest_condition * (mean - radius)) then
+        operators%k_inverse(i, 1) = k(i, 2) / determinant
+        operators%k_inverse(i, 2) = k(i, 1) / determinant
+        operators%k_inverse(i, 3) = -k(i, 3) / determinant
+      else
+        n_singular = n_singular + 1
+        if (n_singular > most_reported) cycle
+        write (text, '(a,i0,a,g0.7,a,g0.7,a)') 'point ', operators%storage%point_at(i), ' at (', &
+          position(i, 1), ', ', position(i, 2), ') m'
+        call errors%add('the shape tensor is singular: the family is too small or lies on '// &
+          'one line', trim(text), allowed='condition number below 1e6; a larger horizon helps')
+      end if
+    end do
+    if (n_singular > most_reported) then
+      write (text, '(i0,a)') n_singular - most_reported, ' more points have a singular shape tensor'
+      call errors%add(trim(text))
+    end if
+  end subroutine invert_shape_tensors
+
+end module pd_shape_tensor
