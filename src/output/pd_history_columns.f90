@@ -101,6 +101,7 @@ contains
     type(block_view_t), intent(in) :: block
     real(wp) :: alpha(n_block)
 
+    alpha = 0.0_wp
     call block%model%materials%plastic_strain_block(block%number, block%state%law_points_t, alpha)
     part = maxval(block%model%points%in_body(block%lo:block%hi) * alpha(:block%hi - block%lo + 1))
   end function plastic_strain
@@ -109,10 +110,8 @@ contains
     type(block_view_t), intent(in) :: block
     real(wp) :: terms(n_block), density(n_block)
 
-    if (block%hi - block%lo + 1 < n_block) then
-      terms = 0.0_wp
-      density = 0.0_wp
-    end if
+    if (block%hi - block%lo + 1 < n_block) terms = 0.0_wp
+    density = 0.0_wp
     call block%model%materials%density_block(block%number, density)
     call square(block%lo, block%hi, block%model%points%volume, block%state%velocity, terms)
     part = 0.5_wp * block_dot(density, terms)
@@ -135,12 +134,17 @@ contains
   pure real(wp) function strain_energy(block) result(part)
     type(block_view_t), intent(in) :: block
     real(wp) :: terms(n_block)
-    integer  :: n
+    integer  :: i, b
 
-    n = block%hi - block%lo + 1
-    if (n < n_block) terms = 0.0_wp
+    if (block%hi - block%lo + 1 < n_block) terms = 0.0_wp
     call block%model%materials%energy_block(block%number, block%state%law_points_t, terms)
-    terms(:n) = block%model%points%volume(block%lo:block%hi) * terms(:n)
+    associate (volume => block%model%points%volume)
+      !$omp simd simdlen(8) private(b)
+      do i = block%lo, block%hi
+        b = i - block%lo + 1
+        terms(b) = volume(i) * terms(b)
+      end do
+    end associate
     part = block_sum(terms)
   end function strain_energy
 
