@@ -190,6 +190,20 @@ def test_a_restart_may_end_later(run_case, copy):
     rows = history(copy / "out" / "case_history.csv")
     assert rows["strain"][-1] >= 0.042
     assert (rows["step"][1:] > rows["step"][:-1]).all()
+    assert stored_rows(copy / "out") == len(rows["step"])
+
+
+@pytest.mark.parametrize("count", [20, 3000])
+def test_a_restart_may_ask_for_other_rows(run_case, copy, count):
+    before = stored_rows(copy / "out")
+    text = LONG.replace("history_count = 400", f"history_count = {count}")
+    done = run_case(text, copy, "--restart", "--quiet")
+    assert done.returncode == 0, done.stderr
+    rows = history(copy / "out" / "case_history.csv")
+    assert len(rows["step"]) > before
+    assert stored_rows(copy / "out") == len(rows["step"])
+    with h5py.File(copy / "out" / "case.h5", locking=False) as file:
+        assert file["history"].attrs["rows"] == len(rows["step"])
 
 
 def test_a_restart_may_ask_for_other_frames(run_case, copy, straight):
