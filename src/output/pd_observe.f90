@@ -28,8 +28,8 @@ module pd_observe
     type(ledger_t) :: ledger
   end type moment_t
 
-  !> A block of rows lo to hi of the fields as the columns see it; row 1 of the arrays is row lo. Rows
-  !> behind the last one are 0, for sums go over whole blocks.
+  !> A block of rows lo to hi of the fields as the columns see it; row 1 of the arrays is row lo.
+  !> Rows behind the last one are 0, for sums go over whole blocks.
   type :: block_view_t
     type(model_t), pointer :: model => null()
     type(state_t), pointer :: state => null()

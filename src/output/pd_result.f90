@@ -24,7 +24,7 @@ module pd_result
   implicit none
   private
 
-  public :: places_t, result_t
+  public :: places_t, result_t, bunch
   public :: create_result, resume_result, add_row, write_rows, write_frame, write_failed_frame
   public :: finish_result, result_exists
 
