@@ -71,6 +71,7 @@ echo "Lint"
 stage "compiler warnings" compiler_warnings
 stage "fortitude" $bin/fortitude check --no-show-fixes src tests
 stage "layers" layers
+stage "layers of perigeo_post" $bin/python tools/check_python_layers.py
 stage "layout of the text" layout
 stage "shell scripts" shell_scripts
 stage "ruff" $bin/ruff check .

@@ -8,140 +8,29 @@ Example::
     print(measure_band(run, strain=0.01).as_dict())
     save_figure(contour_figure(run.frames()[1:]), "bands.pdf")
 
-Everything that the command line does is a function here.
+Everything that the command line does is a function here. The names and their modules are listed
+in __init__.pyi; a module is imported when one of its names is asked for, so that reading a result
+needs neither matplotlib nor the study engine.
 """
 
-from .animation import animate
-from .band import (
-    Band,
-    BandMeasure,
-    BandSystem,
-    Line,
-    Profile,
-    Width,
-    line_across,
-    profile_along,
-    profile_width,
-)
-from .band_search import find_bands
-from .contours import contour_figure
-from .curves import (
-    Curve,
-    Modulus,
-    apparent_modulus,
-    axial_stress,
-    curve_numbers,
-    energy_curves,
-    history_curve,
-    peak,
-    stress_strain,
-)
-from .errors import (
-    FieldNotFoundError,
-    FrameNotFoundError,
-    NoBandError,
-    OutputError,
-    PostError,
-    RequestError,
-    ResultError,
-    SchemaError,
-)
-from .export import (
-    to_json,
-    write_bands,
-    write_curves,
-    write_points,
-    write_profiles,
-    write_rows,
-)
-from .fields import Field
-from .figures import (
-    band_figure,
-    column_figure,
-    compare_figure,
-    curve_figure,
-    energy_figure,
-    profile_figure,
-    stress_strain_figure,
-)
-from .history import History, read_history
-from .measures import (
-    compare_runs,
-    frame_bands,
-    frame_profile,
-    labels_for,
-    largest_plastic_strain,
-    measure_band,
-    run_facts,
-)
-from .result import SCHEMA, SCHEMA_VERSIONS, Frame, Run
-from .sampling import PointSet
-from .study import StudyError, StudyOptions, run_study
-from .style import save_figure
+import re
+from importlib import import_module
+from pathlib import Path
+from typing import Any
 
-__version__ = "0.1.0"
+_STUB = Path(__file__).with_suffix(".pyi").read_text(encoding="utf-8")
+_HOMES = {name: home for home, name in re.findall(r"^from (\S+) import (\w+) as", _STUB, re.M)}
 
-__all__ = [
-    "SCHEMA",
-    "SCHEMA_VERSIONS",
-    "Band",
-    "BandMeasure",
-    "BandSystem",
-    "Curve",
-    "Field",
-    "FieldNotFoundError",
-    "Frame",
-    "FrameNotFoundError",
-    "History",
-    "Line",
-    "Modulus",
-    "NoBandError",
-    "OutputError",
-    "PointSet",
-    "PostError",
-    "Profile",
-    "RequestError",
-    "ResultError",
-    "Run",
-    "SchemaError",
-    "StudyError",
-    "StudyOptions",
-    "Width",
-    "__version__",
-    "animate",
-    "apparent_modulus",
-    "axial_stress",
-    "band_figure",
-    "column_figure",
-    "compare_figure",
-    "compare_runs",
-    "contour_figure",
-    "curve_figure",
-    "curve_numbers",
-    "energy_curves",
-    "energy_figure",
-    "find_bands",
-    "frame_bands",
-    "frame_profile",
-    "history_curve",
-    "labels_for",
-    "largest_plastic_strain",
-    "line_across",
-    "measure_band",
-    "peak",
-    "profile_along",
-    "profile_figure",
-    "profile_width",
-    "read_history",
-    "run_facts",
-    "run_study",
-    "save_figure",
-    "stress_strain",
-    "stress_strain_figure",
-    "to_json",
-    "write_bands",
-    "write_curves",
-    "write_points",
-    "write_profiles",
-    "write_rows",
-]
+__all__ = sorted(_HOMES)
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    value = getattr(import_module(_HOMES[name], __name__), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return __all__

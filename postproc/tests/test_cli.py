@@ -12,7 +12,7 @@ import synthetic
 from PIL import Image
 from test_figures import assert_drawn
 
-from perigeo_post.cli import COMMANDS, main
+from perigeo_post.cli.command_line import COMMANDS, main
 
 Capture = pytest.CaptureFixture[str]
 

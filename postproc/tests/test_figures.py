@@ -23,9 +23,9 @@ from perigeo_post import (
     save_figure,
     stress_strain_figure,
 )
-from perigeo_post.contours import common_scale, lattice_corners, panel_of
-from perigeo_post.fields import label_of
-from perigeo_post.style import prefix_for
+from perigeo_post.draw.contours import common_scale, lattice_corners, panel_of
+from perigeo_post.draw.style import prefix_for
+from perigeo_post.read.fields import label_of
 
 
 def assert_drawn(path: Path, colours: int = 20) -> None:

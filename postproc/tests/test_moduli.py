@@ -9,7 +9,7 @@ import pytest
 import synthetic
 
 from perigeo_post import FieldNotFoundError, RequestError, Run
-from perigeo_post.moduli import gauge_line, gauge_modulus, gauge_strain, mean_modulus
+from perigeo_post.measure.moduli import gauge_line, gauge_modulus, gauge_strain, mean_modulus
 
 E, NU = 50e6, 0.3
 SLOPE = E / (1.0 - NU**2)

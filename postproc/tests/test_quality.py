@@ -10,8 +10,8 @@ import synthetic
 from conftest import x_bands
 
 from perigeo_post import RequestError, Run
-from perigeo_post.pattern import earlier_frame, pattern_of
-from perigeo_post.quality import (
+from perigeo_post.measure.pattern import earlier_frame, pattern_of
+from perigeo_post.measure.quality import (
     kinetic_bound,
     kinetic_curve,
     kinetic_state,
@@ -19,7 +19,7 @@ from perigeo_post.quality import (
     reaction_gap,
     reference_velocity,
 )
-from perigeo_post.softening import softening_branch, strain_rate
+from perigeo_post.measure.softening import softening_branch, strain_rate
 
 DX = 0.04
 EXTRA = 0.003  # [m/s] velocity beside that of the frame

@@ -17,12 +17,12 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from perigeo_post import OutputError, RequestError, ResultError
-from perigeo_post.cli import main
-from perigeo_post.report import gather, write_report
-from perigeo_post.report_check import LARGE, check_report, check_text
-from perigeo_post.report_publish import BEGIN, END, publish, tables
-from perigeo_post.report_values import HEADLINE, QUALITY, column_text, duration, number, prefixed
-from perigeo_post.study_measures import MEASURES
+from perigeo_post.cli.command_line import main
+from perigeo_post.report.check import LARGE, check_report, check_text
+from perigeo_post.report.publish import BEGIN, END, publish, tables
+from perigeo_post.report.values import HEADLINE, QUALITY, column_text, duration, number, prefixed
+from perigeo_post.report.write import gather, write_report
+from perigeo_post.study.measures import MEASURES
 
 Capture = pytest.CaptureFixture[str]
 SHA = "0123456789abcdef" * 4

@@ -10,20 +10,20 @@ from typing import Any
 
 import pytest
 
-from perigeo_post.errors import RequestError
-from perigeo_post.study_expressions import (
+from perigeo_post.read.errors import RequestError
+from perigeo_post.study.expressions import (
     TABLE_FUNCTIONS,
     Expression,
     ExpressionError,
     MissingValueError,
     Numbers,
 )
-from perigeo_post.study_findings import Finding, TableRow, evaluate
-from perigeo_post.study_jobs import Job, Record
-from perigeo_post.study_namelist import NamelistError, file_names, parse_namelist
-from perigeo_post.study_program import Check, find_program, message_of, read_check
-from perigeo_post.study_progress import Progress, duration, steps_done
-from perigeo_post.study_runner import weight
+from perigeo_post.study.findings import Finding, TableRow, evaluate
+from perigeo_post.study.jobs import Job, Record
+from perigeo_post.study.namelist import NamelistError, file_names, parse_namelist
+from perigeo_post.study.program import Check, find_program, message_of, read_check
+from perigeo_post.study.progress import Progress, duration, steps_done
+from perigeo_post.study.runner import weight
 
 # ---- expressions -----------------------------------------------------------------------------
 

@@ -13,16 +13,16 @@ from conftest import x_bands
 from test_figures import assert_drawn
 
 from perigeo_post import RequestError, Run, save_figure
-from perigeo_post.study_contours import contours
-from perigeo_post.study_curves import curves, history, quality
-from perigeo_post.study_drawing import legend, legend_place
-from perigeo_post.study_figures import FIGURE_OPTIONS, FIGURES
-from perigeo_post.study_layout import shared
-from perigeo_post.study_measures import MEASURES
-from perigeo_post.study_plots import plot
-from perigeo_post.study_profiles import profiles
-from perigeo_post.study_types import Column, State, StudyRun
-from perigeo_post.style import new_figure, style
+from perigeo_post.draw.style import new_figure, style
+from perigeo_post.study.contours import contours
+from perigeo_post.study.curves import curves, history, quality
+from perigeo_post.study.drawing import legend, legend_place
+from perigeo_post.study.figures import FIGURE_OPTIONS, FIGURES
+from perigeo_post.study.layout import shared
+from perigeo_post.study.measures import MEASURES
+from perigeo_post.study.plots import plot
+from perigeo_post.study.profiles import profiles
+from perigeo_post.study.types import Column, State, StudyRun
 
 AT = State(0.01)
 COLUMNS = {

@@ -8,11 +8,11 @@ from typing import Any
 
 import pytest
 
-from perigeo_post.study_file import Kinds, Study, load_study
-from perigeo_post.study_options import OPTIONS
-from perigeo_post.study_toml import StudyError, key_lines
-from perigeo_post.study_types import Column, Drawing, Measure
-from perigeo_post.style import new_figure
+from perigeo_post.draw.style import new_figure
+from perigeo_post.study.file import Kinds, Study, load_study
+from perigeo_post.study.options import OPTIONS
+from perigeo_post.study.toml import StudyError, key_lines
+from perigeo_post.study.types import Column, Drawing, Measure
 
 BASE = """\
 ! A base.
@@ -347,6 +347,6 @@ j.k = 6
 
 
 def test_every_option_of_a_figure_has_a_form() -> None:
-    from perigeo_post.study_figures import FIGURE_OPTIONS
+    from perigeo_post.study.figures import FIGURE_OPTIONS
 
     assert set().union(*FIGURE_OPTIONS.values()) == set(OPTIONS)

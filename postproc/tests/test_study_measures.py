@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from perigeo_post import Run
-from perigeo_post.study_measures import MEASURES, line_meeting
-from perigeo_post.study_types import State, Value
+from perigeo_post.study.measures import MEASURES, line_meeting
+from perigeo_post.study.types import State, Value
 
 AT_ONE = State(0.01)
 PAPER = ((0.0, 0.5), (1.0, 1.5))

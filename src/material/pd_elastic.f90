@@ -3,7 +3,8 @@
 !> Source: doc/theory.md, section 3.
 module pd_elastic
   use pd_kinds, only: n_block, wp
-  use pd_law, only: flow_t, law_points_t, law_t, remembered_t
+  use pd_labels, only: label_t
+  use pd_law, only: flow_t, law_points_t, law_t
   implicit none
   private
 
@@ -35,7 +36,7 @@ contains
 
   !> Nothing.
   pure function remembers() result(columns)
-    type(remembered_t), allocatable :: columns(:)
+    type(label_t), allocatable :: columns(:)
 
     allocate (columns(0))
   end function remembers
@@ -49,7 +50,7 @@ contains
     type(flow_t), intent(inout) :: flow
     real(wp) :: stress(n_block, 4)
 
-    flow%any = .false.
+    flow%n = 0
     call isotropic_stress_block(self%lambda, self%shear_modulus, first, lo, hi, strain, stress)
     points%stress(lo:hi, :) = stress(lo - first + 1:hi - first + 1, :)
   end subroutine stress_block

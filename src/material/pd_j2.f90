@@ -6,7 +6,8 @@
 module pd_j2
   use pd_elastic, only: elastic_t, new_elastic
   use pd_kinds, only: n_block, wp
-  use pd_law, only: flow_t, law_points_t, law_t, remembered_t
+  use pd_labels, only: label_t
+  use pd_law, only: flow_t, law_points_t, law_t
   use pd_tensors, only: inner, norm
   implicit none
   private
@@ -58,18 +59,18 @@ contains
 
   !> What a point remembers.
   pure function remembers() result(columns)
-    type(remembered_t), allocatable :: columns(:)
+    type(label_t), allocatable :: columns(:)
     character(2), parameter :: ends(4) = ['xx', 'yy', 'zz', 'xy']
     integer :: c
 
     allocate (columns(alpha))
     do c = 1, 4
-      columns(plastic_strain + c) = remembered_t('plastic_strain_'//ends(c), '1', &
+      columns(plastic_strain + c) = label_t('plastic_strain_'//ends(c), '1', &
         'plastic strain '//ends(c))
-      columns(back_stress + c) = remembered_t('back_stress_'//ends(c), 'Pa', &
+      columns(back_stress + c) = label_t('back_stress_'//ends(c), 'Pa', &
         'back stress '//ends(c))
     end do
-    columns(alpha) = remembered_t('equivalent_plastic_strain', '1', &
+    columns(alpha) = label_t('equivalent_plastic_strain', '1', &
       'equivalent plastic strain, accumulated')
   end function remembers
 
@@ -285,28 +286,27 @@ contains
     type(flow_t), intent(inout) :: flow
     type(yielding_t) :: yielding
     real(wp) :: trial(n_block, 4), excess(n_block)
-    integer  :: places(n_block), n, b
+    integer  :: n, i
 
     call trial_block(self, first, lo, hi, strain, points, trial, excess)
     n = 0
-    do b = lo - first + 1, hi - first + 1
-      if (excess(b) <= 0.0_wp) cycle
+    do i = lo, hi
+      if (excess(i - first + 1) <= 0.0_wp) cycle
       n = n + 1
-      places(n) = b
+      flow%rows(n) = i
     end do
-    flow%any = n > 0
+    flow%n = n
     if (n > 0) then
-      flow%dissipated(lo - first + 1:hi - first + 1) = 0.0_wp
-      call gather_points(n, first, places, trial, points, yielding)
+      call gather_points(n, first, flow%rows, trial, points, yielding)
       call return_to_surface(self, n, yielding)
-      call scatter_points(n, first, places, yielding, trial, points, flow%dissipated)
+      call scatter_points(n, first, flow%rows, yielding, trial, points, flow%dissipated)
     end if
     points%stress(lo:hi, :) = trial(lo - first + 1:hi - first + 1, :)
   end subroutine stress_block
 
   !> The yielding points, one behind the other.
-  pure subroutine gather_points(n, first, places, trial, points, yielding)
-    integer,            intent(in)  :: n, first, places(n_block)   !! place 1: row `first`
+  pure subroutine gather_points(n, first, rows, trial, points, yielding)
+    integer,            intent(in)  :: n, first, rows(n_block)
     real(wp),           intent(in)  :: trial(n_block, 4)
     type(law_points_t), intent(in)  :: points
     type(yielding_t),   intent(out) :: yielding
@@ -314,44 +314,44 @@ contains
 
     associate (history => points%history)
       do k = 1, n
-        yielding%yield_stress(k) = points%strength(first + places(k) - 1)
-        yielding%alpha(k) = history(first + places(k) - 1, alpha)
+        yielding%yield_stress(k) = points%strength(rows(k))
+        yielding%alpha(k) = history(rows(k), alpha)
       end do
       do c = 1, 4
         do k = 1, n
-          yielding%stress(k, c) = trial(places(k), c)
-          yielding%plastic_strain(k, c) = history(first + places(k) - 1, plastic_strain + c)
-          yielding%back_stress(k, c) = history(first + places(k) - 1, back_stress + c)
+          yielding%stress(k, c) = trial(rows(k) - first + 1, c)
+          yielding%plastic_strain(k, c) = history(rows(k), plastic_strain + c)
+          yielding%back_stress(k, c) = history(rows(k), back_stress + c)
         end do
       end do
     end associate
   end subroutine gather_points
 
   !> Put the returned points back, and tell what they dissipated.
-  pure subroutine scatter_points(n, first, places, yielding, trial, points, dissipated)
-    integer,            intent(in)    :: n, first, places(n_block)   !! place 1: row `first`
+  pure subroutine scatter_points(n, first, rows, yielding, trial, points, dissipated)
+    integer,            intent(in)    :: n, first, rows(n_block)
     type(yielding_t),   intent(in)    :: yielding
     real(wp),           intent(inout) :: trial(n_block, 4)
     type(law_points_t), intent(inout) :: points
-    real(wp),           intent(inout) :: dissipated(n_block)         !! [J/m^3]
+    real(wp),           intent(inout) :: dissipated(n_block)   !! out: (n) [J/m^3]
     real(wp), parameter :: twice(4) = [1.0_wp, 1.0_wp, 1.0_wp, 2.0_wp]
-    integer :: b, i, k, c
+    integer :: i, k, c
 
+    dissipated(:n) = 0.0_wp
     associate (history => points%history)
       do c = 1, 4
         do k = 1, n
-          b = places(k)
-          i = first + b - 1
-          dissipated(b) = dissipated(b) + 0.5_wp * twice(c) &
+          i = rows(k)
+          dissipated(k) = dissipated(k) + 0.5_wp * twice(c) &
             * (points%stress(i, c) + yielding%stress(k, c)) &
             * (yielding%plastic_strain(k, c) - history(i, plastic_strain + c))
-          trial(b, c) = yielding%stress(k, c)
+          trial(i - first + 1, c) = yielding%stress(k, c)
           history(i, plastic_strain + c) = yielding%plastic_strain(k, c)
           history(i, back_stress + c) = yielding%back_stress(k, c)
         end do
       end do
       do k = 1, n
-        history(first + places(k) - 1, alpha) = yielding%alpha(k)
+        history(rows(k), alpha) = yielding%alpha(k)
       end do
     end associate
   end subroutine scatter_points
@@ -364,12 +364,13 @@ contains
     type(law_points_t), intent(in) :: points
     real(wp),   intent(out) :: trial(n_block, 4)   !! S* xx yy zz xy [Pa]; row 1: row `first`
     real(wp),   intent(out) :: excess(n_block)     !! [Pa^2]
-    real(wp) :: g2, lambda, floor_strength, volumetric, exx, eyy, ezz, exy, mean, strength
+    real(wp) :: g2, lambda, hi_modulus, floor_strength, volumetric, exx, eyy, ezz, exy, mean, strength
     real(wp) :: etaxx, etayy, etazz, etaxy
     integer  :: i, b
 
     g2 = 2.0_wp * law%shear_modulus
     lambda = law%lambda
+    hi_modulus = law%isotropic_modulus
     floor_strength = 0.0_wp
     if (law%isotropic_modulus < 0.0_wp) floor_strength = law%residual_strength
     associate (history => points%history, yield_stress => points%strength)
@@ -392,7 +393,7 @@ contains
         etazz = g2 * (ezz - mean) - history(i, 7)
         etaxy = g2 * exy - history(i, 8)
         strength = max(min(floor_strength, yield_stress(i)), &
-          yield_stress(i) + law%isotropic_modulus * history(i, 9))
+          yield_stress(i) + hi_modulus * history(i, 9))
         excess(b) = 1.5_wp * (etaxx**2 + etayy**2 + etazz**2 + 2.0_wp * etaxy**2) - strength**2
       end do
     end associate

@@ -1,22 +1,16 @@
 !> A material law: what the points of a material remember, and their stress.
 !>
 !> A law is a type that extends `law_t`, in a module of its own; set-up chooses it by one line. A
-!> law works on rows lo to hi of the fields of all points, which belong to its material. Strain,
-!> and what it tells of its flow, are arrays of a block, whose row 1 is row `first` of the fields.
+!> law works on rows lo to hi of the fields of all points, which belong to its material. Strain is an
+!> array of a block, whose row 1 is row `first` of the fields.
 !> Source: doc/theory.md, section 3.
 module pd_law
   use pd_kinds, only: n_block, wp
+  use pd_labels, only: label_t
   implicit none
   private
 
-  public :: law_t, flow_t, law_points_t, remembered_t
-
-  !> One number that a point remembers.
-  type :: remembered_t
-    character(32)  :: name = ''
-    character(8)   :: unit = ''
-    character(120) :: sentence = ''
-  end type remembered_t
+  public :: law_t, flow_t, law_points_t
 
   !> Fields that laws read and write.
   type :: law_points_t
@@ -25,10 +19,11 @@ module pd_law
     real(wp), allocatable :: strength(:)     !! before any flow (n) [Pa]; not of a law without one
   end type law_points_t
 
-  !> What happened in a block in a step.
+  !> What flowed in some rows of a block in a step.
   type :: flow_t
-    logical  :: any = .false.              !! some row flows; else the rest says nothing
-    real(wp) :: dissipated(n_block)        !! work of the stress on the plastic strain [J/m^3]
+    integer  :: n = 0                      !! rows that flow
+    integer  :: rows(n_block)              !! (n) ascending
+    real(wp) :: dissipated(n_block)        !! work of the stress on the plastic strain (n) [J/m^3]
   end type flow_t
 
   type, abstract :: law_t
@@ -44,8 +39,8 @@ module pd_law
   abstract interface
     !> The columns of the history, all 0 at first.
     pure function remembers_of() result(columns)
-      import :: remembered_t
-      type(remembered_t), allocatable :: columns(:)
+      import :: label_t
+      type(label_t), allocatable :: columns(:)
     end function remembers_of
     !> Stress of rows lo to hi; the history goes from step n to n+1.
     pure subroutine stress_of(self, first, lo, hi, strain, points, flow)

@@ -115,7 +115,6 @@ contains
       lattice%cells = d%layout == 'cells'
       lattice%tributary = d%volumes == 'tributary'
       lattice%rows = ceiling(d%horizon / d%spacing - 1.0e-6_wp)
-      lattice%with_voids = input%run%operators /= 'list'
     end associate
     do k = 1, size(layers)
       layers(k)%side = input%boundaries(k)%side
@@ -147,30 +146,31 @@ contains
     model%spacing = input%discretisation%spacing
     model%delta = input%discretisation%horizon
     horizon = new_horizon(model%delta, input%discretisation%influence)
-    call choose_operators(horizon, model, errors)
-    if (errors%count() > 0) return
-    call invert_shape_tensors(model%operators, model%body%position, model%body%volume, errors)
+    call choose_operators(horizon, input%run%operators, model, errors)
     if (errors%count() > 0) return
     model%blocks = model%operators%domain%blocks
     call set_up_points(model)
+    call invert_shape_tensors(model%operators, model%points%position, model%points%volume, errors)
+    if (errors%count() > 0) return
     call set_up_materials(input, model)
     call set_up_boundaries(input, model)
     call set_up_pressures(input, model, errors)
     if (.not. any(model%points%free > 0.0_wp)) call errors%add('no point is free to move')
   end subroutine set_up_model
 
-  !> Lattice operators for a body on a lattice (its places are then numbered with voids), the bond
-  !> list for any other.
-  subroutine choose_operators(horizon, model, errors)
+  !> Lattice operators for a body on a lattice, unless a list is asked for; the bond list for any
+  !> other.
+  subroutine choose_operators(horizon, form, model, errors)
     type(horizon_t),    intent(in)    :: horizon
+    character(*),       intent(in)    :: form   !! auto, lattice or list
     type(model_t),      intent(inout) :: model
     type(error_list_t), intent(inout) :: errors
     type(lattice_operators_t), allocatable :: lattice
     type(bond_list_t),         allocatable :: list
 
-    if (model%body%stride > 0) then
+    if (allocated(model%body%place) .and. form /= 'list') then
       allocate (lattice)
-      call new_lattice_operators(horizon, model%spacing, model%body%stride, model%body%volume, &
+      call new_lattice_operators(horizon, model%spacing, model%body%place, model%body%volume, &
         lattice)
       call move_alloc(lattice, model%operators)
     else
@@ -184,12 +184,12 @@ contains
   subroutine set_up_points(model)
     type(model_t), intent(inout) :: model
 
-    associate (points => model%points, body => model%body)
-      points%position = body%position
-      points%volume = body%volume
-      allocate (points%in_body(body%n), points%place(body%n), source=0.0_wp)
-      allocate (points%free(body%n, 2), source=0.0_wp)
-      where (body%boundary == 0) points%in_body = 1.0_wp
+    associate (points => model%points, body => model%body, storage => model%operators%storage)
+      points%position = storage%spread(body%position)
+      points%volume = storage%spread(body%volume)
+      points%in_body = storage%spread(merge(1.0_wp, 0.0_wp, body%boundary == 0))
+      points%free = spread(storage%spread(spread(1.0_wp, 1, body%n)), 2, 2)
+      allocate (points%place(storage%rows), source=0.0_wp)
     end associate
   end subroutine set_up_points
 
@@ -197,6 +197,7 @@ contains
   subroutine set_up_materials(input, model)
     type(input_t), intent(in)    :: input
     type(model_t), intent(inout) :: model
+    real(wp), allocatable :: strength(:)
 
     allocate (model%materials%list(1))
     associate (m => input%material, material => model%materials%list(1))
@@ -205,9 +206,11 @@ contains
       material%youngs_modulus = m%youngs_modulus
       allocate (material%measure, source=new_measure(m%strain_measure))
       allocate (material%law, source=new_law(m))
-      call divide_into_runs(model%blocks, spread(1, 1, model%body%n), model%materials)
-      allocate (model%strength(model%body%n))
-      call set_up_strength(input, model%body%position, model%strength)
+      call divide_into_runs(model%blocks, &
+        model%operators%storage%spread(spread(1, 1, model%body%n)), model%materials)
+      allocate (strength(model%body%n))
+      call set_up_strength(input, model%body%position, strength)
+      model%strength = model%operators%storage%spread(strength)
       if (input%stabilisation%method == 'silling') call set_up_control( &
         input%stabilisation%factor, m%youngs_modulus, model)
     end associate
@@ -245,9 +248,9 @@ contains
     type(model_t), intent(inout) :: model
     real(wp), allocatable :: c(:)
 
-    allocate (c(model%body%n), source=control_stiffness(factor, youngs_modulus, model%delta, &
+    allocate (c(model%operators%n), source=control_stiffness(factor, youngs_modulus, model%delta, &
       model%operators%weight_sum))
-    where (model%body%boundary < 0) c = 0.0_wp
+    where (model%points%volume <= 0.0_wp) c = 0.0_wp
     call model%operators%set_control(c)
   end subroutine set_up_control
 
@@ -284,11 +287,11 @@ contains
     do k = 1, size(input%boundaries)
       model%boundaries(k) = new_boundary(input%boundaries, k, model%body)
     end do
-    call mark_free(model%body%position, model%body%volume, input%material%density, &
-      model%boundaries, model%points%free)
-    do k = 1, 2
-      where (model%body%boundary < 0) model%points%free(:, k) = 0.0_wp
+    do k = 1, size(model%boundaries)
+      model%boundaries(k)%points = model%operators%storage%row(model%boundaries(k)%points)
     end do
+    call mark_free(model%points%position, model%points%volume, input%material%density, &
+      model%boundaries, model%points%free)
 
     model%damping = input%integration%damping
     if (input%platens(1) == 0) return
@@ -315,8 +318,9 @@ contains
 
     allocate (model%pressures(size(input%pressures)))
     if (size(input%pressures) == 0) return
-    allocate (vectors(model%body%n, 2), source=0.0_wp)
-    call surface_vectors(model%operators, model%body%volume, vectors)
+    allocate (vectors(model%operators%n, 2), source=0.0_wp)
+    call surface_vectors(model%operators, model%points%volume, vectors)
+    vectors = vectors(model%operators%storage%row, :)
     depth = 2 * ceiling(model%delta / model%spacing - 1.0e-6_wp)   ! families that touch cut ones
     do k = 1, size(input%pressures)
       associate (given => input%pressures(k), pressure => model%pressures(k))
@@ -326,6 +330,7 @@ contains
         if (size(given%span) > 0) pressure%span = given%span
         pressure%factor = new_ramp(given%ramp_time)
         call spread_pressure(model%body, model%boundaries, vectors, model%spacing, depth, pressure)
+        pressure%points = model%operators%storage%row(pressure%points)
         if (size(pressure%points) == 0) &
           call errors%add('a pressure acts on no point', '&pressure name = '//given%name)
       end associate

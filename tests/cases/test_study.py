@@ -15,15 +15,16 @@ from pathlib import Path
 import pytest
 from case_files import SPECIMEN
 from conftest import ROOT
-from perigeo_post import RequestError, StudyError, StudyOptions, curves, run_study
-from perigeo_post.cli import main
-from perigeo_post.study_figures import FIGURE_OPTIONS
-from perigeo_post.study_file import Kinds
-from perigeo_post.study_jobs import only_one
-from perigeo_post.study_measures import MEASURES
-from perigeo_post.study_options import OPTIONS
-from perigeo_post.study_types import Column, Drawing, Measure
-from perigeo_post.style import new_figure
+from perigeo_post import RequestError, StudyError, StudyOptions, run_study
+from perigeo_post.cli.command_line import main
+from perigeo_post.draw.style import new_figure
+from perigeo_post.measure import curves
+from perigeo_post.study.figures import FIGURE_OPTIONS
+from perigeo_post.study.file import Kinds
+from perigeo_post.study.jobs import only_one
+from perigeo_post.study.measures import MEASURES
+from perigeo_post.study.options import OPTIONS
+from perigeo_post.study.types import Column, Drawing, Measure
 
 BASE = SPECIMEN.replace("output_dir = 'out'", "title = 'a specimen'")
 STUDY = """\
@@ -413,7 +414,7 @@ def start(program, folder, jobs=2):
     code = (
         "import sys, test_study\n"
         "from pathlib import Path\n"
-        "from perigeo_post.study import Stopped, StudyOptions, run_study\n"
+        "from perigeo_post.study.run import Stopped, StudyOptions, run_study\n"
         "try:\n"
         f"    options = StudyOptions(program=Path({str(program)!r}), jobs={jobs})\n"
         "    sys.exit(run_study(Path('trial.toml'), options, test_study.KINDS))\n"

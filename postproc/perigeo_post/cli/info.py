@@ -1,0 +1,81 @@
+"""`perigeo-post info`: what a result holds and how far it has come."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+import numpy as np
+
+from ..measure import export, measures
+from ..read.run import Run
+from .options import Arguments, add_files, add_json
+
+
+def add_options(parser: argparse.ArgumentParser) -> None:
+    add_files(parser)
+    add_json(parser)
+    parser.add_argument("--input", action="store_true", help="print the namelist of the run")
+    parser.add_argument("--values", action="store_true", help="print all input values as used")
+
+
+def carry_out(args: Arguments) -> None:
+    runs = [Run(path) for path in args.files]
+    if args.input or args.values:
+        for run in runs:
+            if args.input:
+                print(run.input_text, end="" if run.input_text.endswith("\n") else "\n")
+            if args.values:
+                print("\n".join(f"{key} = {value}" for key, value in run.values.items()))
+        return
+    facts = [measures.run_facts(run) for run in runs]
+    if args.json:
+        print(export.to_json(facts[0] if len(facts) == 1 else facts))
+        return
+    print("\n\n".join(_info_text(f) for f in facts))
+
+
+def _info_text(facts: dict[str, Any]) -> str:
+    size = np.asarray(facts["upper"]) - np.asarray(facts["lower"])
+    state = "complete" if facts["complete"] else "not complete: still running, or stopped early"
+    layout = "lattice" if facts["on_lattice"] else "cloud"
+    lines = [
+        f"{facts['name']}: {facts['title']}",
+        f"  file         {facts['file']} ({state})",
+        f"  body         {size[0]:g} m x {size[1]:g} m, {facts['body_points']} points ({layout}), "
+        f"{facts['fictitious_points']} fictitious",
+        f"  spacing      {facts['spacing']:g} m, horizon {facts['horizon']:g} m",
+        f"  loading axis {facts['loading_axis'] or 'none (no platens)'}"
+        + (f", boundaries: {', '.join(facts['boundaries'])}" if facts["boundaries"] else ""),
+        f"  fields       {', '.join(facts['fields']) or 'none written yet'}",
+        "  frames       number    step       time [s]    strain    largest plastic strain",
+    ]
+    for f in facts["frames"]:
+        number = "failed" if f["number"] is None else f["number"]
+        strain = f"{f['strain']:9.6f}" if np.isfinite(f["strain"]) else "        -"
+        note = "" if f["valid"] else "   (failing state, left out unless asked for)"
+        lines.append(
+            f"               {number:>6} {f['step']:>8} {f['time']:13.6g} {strain} "
+            f"{f['largest_plastic_strain']:12.5g}{note}"
+        )
+    lines += _history_text(facts["history"])
+    lines += [f"  {key:<14} {value}" for key, value in facts["provenance"].items()]
+    return "\n".join(lines)
+
+
+def _history_text(history: dict[str, Any]) -> list[str]:
+    if "missing" in history:
+        return [f"  history      {history['missing']}"]
+    lines = [f"  history      {history['rows']} rows: {', '.join(history['columns'])}"]
+    if history.get("peak_stress") is not None and history["rows"]:
+        lines.append(
+            f"  peak stress  {history['peak_stress'] / 1e3:.2f} kPa at a strain of "
+            f"{history['strain_at_peak']:.6f} (compression positive)"
+        )
+        modulus = history.get("apparent_modulus")
+        text = f"{modulus / 1e6:.2f} MPa" if modulus is not None else "not determined: "
+        reason = history.get("apparent_modulus_missing", "")
+        lines.append(f"  E_app        {text}{reason}")
+    if "largest_energy_error" in history:
+        lines.append(f"  energy error {history['largest_energy_error']:.2e} at most")
+    return lines

@@ -1,0 +1,1 @@
+"""Draw what was measured: figures, contours, animations, and the style of all of them."""

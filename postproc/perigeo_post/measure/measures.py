@@ -1,0 +1,211 @@
+"""Measures of whole results: the band of a frame, the comparison of runs, the facts of a run."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ..read.errors import FieldNotFoundError, PostError, RequestError
+from ..read.run import Frame, Run
+from .band import (
+    LEVEL,
+    BandMeasure,
+    BandSystem,
+    Line,
+    Profile,
+    line_across,
+    profile_along,
+    profile_width,
+)
+from .band_search import find_bands, search_scale
+from .curves import curve_numbers, modulus_numbers, peak, stress_strain
+
+
+def frame_profile(frame: Frame, line: Line, field: str = "plastic_strain") -> Profile:
+    """Any field with one number a point along a line through the body of a frame."""
+    found = frame.scalar(field)
+    body = frame.run.body
+    return profile_along(
+        frame.run.body_points, found.values[body], line, name=field, unit=found.unit
+    )
+
+
+def frame_bands(frame: Frame, axis: str | None = None, level: float = LEVEL) -> BandSystem:
+    """The two bands of a frame; `axis` is that of loading, y where the run has no platens."""
+    run = frame.run
+    return find_bands(
+        run.body_points,
+        frame["plastic_strain"][run.body],
+        axis or run.strain_axis or "y",
+        run.horizon,
+        level,
+        (run.lower, run.upper),
+    )
+
+
+def measure_band(
+    run: Run,
+    strain: float | None = None,
+    time: float | None = None,
+    number: int | None = None,
+    line: Line | None = None,
+    level: float = LEVEL,
+    axis: str | None = None,
+    normal: bool = False,
+    tolerance: float | None = None,
+) -> BandMeasure:
+    """Width, peak, angle, place of the prevailing band of a frame (the last by default).
+
+    Without `line` the profile runs across the prevailing band at 45 degrees to the loading axis
+    (at right angles to the band with `normal`) through a place on its ridge away from the ends and
+    from the crossing with the other band (band.py says which).
+    """
+    frame = run.frame(strain, time, number, tolerance)
+    if not 0.0 < level < 1.0:
+        raise RequestError(f"the level must lie between 0 and 1, not {level:g}")
+    bands = frame_bands(frame, axis, level)
+    near = None
+    if line is None:
+        line = line_across(
+            bands.prevailing, run.body_points, bands.axis, normal, (run.lower, run.upper)
+        )
+        near = (bands.prevailing.probe, 1.5 * search_scale(run.body_points, run.horizon))
+    profile = frame_profile(frame, line)
+    width = profile_width(profile, run.body_points.spacing, level, near)
+    return BandMeasure(
+        label=run.name,
+        frame=frame.number,
+        time=frame.time,
+        strain=frame.strain,
+        profile=profile,
+        width=width,
+        bands=bands,
+        spacing=run.body_points.spacing,
+        horizon=run.horizon,
+        largest=float(frame["plastic_strain"][run.body].max()),
+    )
+
+
+def largest_plastic_strain(frame: Frame) -> float:
+    """Largest equivalent plastic strain of the body; NaN where the file has none."""
+    try:
+        values = frame["plastic_strain"][frame.run.body]
+    except FieldNotFoundError:
+        return float("nan")
+    return float(values.max()) if len(values) else float("nan")
+
+
+def compare_runs(
+    runs: Sequence[Run],
+    labels: Sequence[str] | None = None,
+    strains: Sequence[float] = (),
+    tension_positive: bool = False,
+) -> list[dict[str, Any]]:
+    """One row a run: peak stress, strain there, stress at given strains, largest alpha, E_app."""
+    names = labels_for(runs, labels)
+    rows = []
+    for run, label in zip(runs, names):
+        last = run.last_frame
+        row: dict[str, Any] = {
+            "run": label,
+            "points": int(run.body.sum()),
+            "spacing": run.spacing,
+            "horizon": run.horizon,
+            "complete": run.complete,
+            "peak_stress": None,
+            "strain_at_peak": None,
+        }
+        if run.platens is not None:
+            curve = stress_strain(run, tension_positive)
+            row["peak_stress"], row["strain_at_peak"] = peak(curve)
+            sign = -1.0 if tension_positive else 1.0
+            for s in strains:
+                row[f"stress_at_{s:g}"] = curve.at(sign * s)
+            row["apparent_modulus"] = modulus_numbers(run)["apparent_modulus"]
+        for s in strains:
+            try:
+                row[f"alpha_at_{s:g}"] = largest_plastic_strain(run.frame(strain=s))
+            except RequestError:
+                row[f"alpha_at_{s:g}"] = None
+        row["last_strain"] = last.strain
+        row["largest_plastic_strain"] = largest_plastic_strain(last)
+        rows.append(row)
+    return rows
+
+
+def labels_for(runs: Sequence[Run], labels: Sequence[str] | None = None) -> list[str]:
+    """Given labels, or the names of the runs made distinct by their folders."""
+    if labels:
+        if len(labels) != len(runs):
+            raise RequestError(f"{len(labels)} labels were given for {len(runs)} results")
+        return list(labels)
+    names = [run.name for run in runs]
+    if len(set(names)) == len(names):
+        return names
+    names = [f"{run.path.resolve().parent.name}/{run.path.stem}" for run in runs]
+    if len(set(names)) == len(names):
+        return names
+    return [f"{name} ({k + 1})" for k, name in enumerate(names)]
+
+
+def run_facts(run: Run) -> dict[str, Any]:
+    """What a run is and how far it has come."""
+    frames = run.frames(include_invalid=True)
+    good = [f for f in frames if f.valid]
+    body = run.body
+    facts: dict[str, Any] = {
+        "file": str(run.path),
+        "name": run.name,
+        "title": run.title,
+        "complete": run.complete,
+        "points": len(body),
+        "body_points": int(body.sum()),
+        "fictitious_points": int((~body).sum()),
+        "on_lattice": run.body_points.lattice is not None,
+        "lower": run.lower,
+        "upper": run.upper,
+        "spacing": run.spacing,
+        "horizon": run.horizon,
+        "loading_axis": run.strain_axis,
+        "boundaries": run.boundary_names,
+        "time_step": run.attributes.get("time_step"),
+        "steps": run.attributes.get("steps"),
+        "frames_planned": run.attributes.get("n_frames"),
+        "frames": [
+            {
+                "number": f.number,
+                "step": f.step,
+                "time": f.time,
+                "strain": f.strain,
+                "valid": f.valid,
+                "largest_plastic_strain": largest_plastic_strain(f),
+            }
+            for f in frames
+        ],
+        "fields": run.field_names if good else [],
+        "provenance": run.provenance,
+    }
+    facts["history"] = _history_facts(run)
+    return facts
+
+
+def _history_facts(run: Run) -> dict[str, Any]:
+    try:
+        history = run.history()
+    except PostError as error:
+        return {"missing": str(error)}
+    facts: dict[str, Any] = {
+        "file": str(history.path),
+        "rows": history.rows,
+        "columns": {name: history.unit(name) for name in history},
+    }
+    if run.platens is not None:
+        try:
+            facts.update({k: v for k, v in curve_numbers(run).items() if k not in ("run", "file")})
+        except FieldNotFoundError as error:
+            facts["curve_missing"] = str(error)
+    if "energy_error" in history and history.rows:
+        facts["largest_energy_error"] = float(np.nanmax(np.abs(history["energy_error"])))
+    return facts

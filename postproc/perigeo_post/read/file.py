@@ -1,0 +1,148 @@
+"""Reading from a result file that the program may be writing.
+
+The file is opened for each reading and closed again at once, without a lock, so that a running
+program is never disturbed.
+"""
+
+from __future__ import annotations
+
+import os
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, TypeVar
+
+import h5py
+import numpy as np
+
+from .errors import ResultError, SchemaError
+from .fields import DEFAULT_COMPONENTS, Field
+
+SCHEMA = "perigeo result"
+SCHEMA_VERSIONS = (1,)
+T = TypeVar("T")
+_ATTEMPTS = 4  # a reading can fall into the moment in which the program writes
+_PAUSE = 0.15  # [s] between them
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[Any]:
+    os.environ.setdefault("HDF5_USE_FILE_LOCKING", "FALSE")  # for HDF5 without the argument
+    try:
+        try:
+            file = h5py.File(path, "r", locking=False)
+        except (TypeError, ValueError):
+            file = h5py.File(path, "r")
+    except OSError as error:
+        raise ResultError(_why_not(path, error)) from error
+    with file:
+        yield file
+
+
+def _why_not(path: Path, error: OSError) -> str:
+    if not path.exists():
+        return f"there is no file {path}"
+    if path.is_dir():
+        return f"{path} is a folder; name the .h5 file in it"
+    if not os.access(path, os.R_OK):
+        return f"no permission to read {path}"
+    first = str(error).splitlines()[0]
+    return f"{path} cannot be opened as HDF5 (damaged, cut off, or another kind of file): {first}"
+
+
+def text_of(value: Any) -> str:
+    """A string of the file, however it is stored."""
+    if isinstance(value, np.ndarray) and value.size == 1:
+        value = value.reshape(-1)[0]
+    if isinstance(value, bytes):
+        return value.decode("utf-8", errors="replace")
+    return str(value)
+
+
+def plain(value: Any) -> Any:
+    """An attribute as str, int, float, or list of these."""
+    if isinstance(value, (bytes, str)):
+        return text_of(value).strip()
+    array = np.asarray(value)
+    if array.dtype.kind in "SOU":
+        texts = [text_of(item).strip() for item in array.reshape(-1)]
+        return texts[0] if array.size == 1 else texts
+    items = array.reshape(-1).tolist()
+    return items[0] if len(items) == 1 else items
+
+
+def read(path: Path, what: Callable[[Any], T]) -> T:
+    """What `what` finds in the open file, tried again while the program may be writing."""
+    for attempt in range(_ATTEMPTS):
+        try:
+            with _opened(path) as file:
+                return what(file)
+        except SchemaError:
+            raise
+        except ResultError:
+            if attempt == _ATTEMPTS - 1 or not _may_be_busy(path):
+                raise
+        except (OSError, RuntimeError) as error:
+            if attempt == _ATTEMPTS - 1:
+                raise ResultError(f"{path} is damaged: {str(error).splitlines()[0]}") from error
+        except (KeyError, ValueError) as error:
+            raise ResultError(f"{path} is not complete: {error.args[0]}") from error
+        time.sleep(_PAUSE)
+    raise AssertionError
+
+
+def _may_be_busy(path: Path) -> bool:
+    """Whether the file was changed in the last seconds."""
+    try:
+        return time.time() - path.stat().st_mtime < 5.0
+    except OSError:
+        return False
+
+
+def checked_attributes(path: Path, file: Any) -> dict[str, Any]:
+    """The attributes of a result file that this reader knows."""
+    found = {key: plain(value) for key, value in file.attrs.items()}
+    if found.get("schema") != SCHEMA:
+        raise SchemaError(
+            f"{path} is not a result of perigeo: its attribute 'schema' is "
+            f"{found.get('schema', 'missing')!r}, expected {SCHEMA!r}"
+        )
+    version = found.get("schema_version")
+    if version not in SCHEMA_VERSIONS:
+        known = ", ".join(str(v) for v in SCHEMA_VERSIONS)
+        raise SchemaError(
+            f"{path} has schema version {version}, this perigeo-post reads {known}: "
+            "use the perigeo-post that came with the program which wrote it "
+            f"(perigeo {found.get('code_version', 'unknown')})"
+        )
+    for group in ("points", "frames"):
+        if group not in file:
+            raise ResultError(f"{path} is not complete: it has no group /{group}")
+    return found
+
+
+def dataset(path: Path, key: str, name: str) -> Field | None:
+    """A dataset with its unit, description and components; None where it is not there."""
+
+    def find(file: Any) -> Field | None:
+        if key not in file:
+            return None
+        data = file[key]
+        attributes = {k: plain(v) for k, v in data.attrs.items()}
+        values = np.asarray(data[()], dtype=float)
+        given = attributes.get("components", "")
+        parts = given if isinstance(given, list) else str(given).replace(",", " ").split()
+        if values.ndim == 2 and len(parts) != values.shape[1]:
+            parts = list(DEFAULT_COMPONENTS.get(values.shape[1], ()))
+        if values.ndim == 1:
+            parts = []
+        return Field(
+            name,
+            values,
+            str(attributes.get("unit", "")),
+            str(attributes.get("description", "")),
+            tuple(str(p) for p in parts),
+        )
+
+    return read(path, find)

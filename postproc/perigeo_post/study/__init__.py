@@ -1,0 +1,1 @@
+"""Carry out a study: plan its runs, make them, measure and draw."""

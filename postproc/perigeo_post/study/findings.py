@@ -1,0 +1,273 @@
+"""Findings: what the table of runs says about a claim of the paper."""
+
+from __future__ import annotations
+
+import ast
+import math
+import string
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from .expressions import (
+    TABLE_FUNCTIONS,
+    Expression,
+    ExpressionError,
+    MissingValueError,
+    Numbers,
+    nearest,
+)
+from .plan import PlannedRun
+from .toml import Key, Table
+from .types import Column, Value
+
+AGREES, IN_PART, DIFFERS, NO_RESULT = "agrees", "agrees in part", "differs", "no result"
+_KEYS = ("title", "paper", "found", "values", "holds", "note")
+_FILTERS = ("series", "run", "label")
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A row of the table "paper says / we find / verdict", before the runs are there."""
+
+    title: str
+    paper: str
+    found: str
+    note: str
+    values: dict[str, Expression]
+    holds: tuple[Expression, ...]
+
+
+@dataclass(frozen=True)
+class TableRow:
+    """A run in the table: what it is, and its numbers."""
+
+    id: str
+    label: str
+    series: str
+    parameters: Mapping[str, Value]
+    cells: Mapping[str, Value]  # parameters and measures
+
+
+# ---- reading ---------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Known:
+    """What expressions may name."""
+
+    series: Sequence[str]
+    parameters: Sequence[str]
+    runs: Sequence[PlannedRun] | None
+    columns: Mapping[str, Column]
+
+    def check_call(self, text: str, call: ast.Call) -> None:
+        """col('column', series='name', parameter=value): raise unless all of these exist."""
+        first = call.args[0] if len(call.args) == 1 else None
+        if not isinstance(first, ast.Constant) or not isinstance(first.value, str):
+            raise ExpressionError(f"'{text}': col and val need the name of one column in quotes")
+        self._one_of(text, "column", first.value, self.columns)
+        wanted: dict[str, Any] = {}
+        for keyword in call.keywords:
+            name = str(keyword.arg)
+            self._one_of(text, "parameter", name, [*_FILTERS, *self.parameters])
+            try:
+                wanted[name] = ast.literal_eval(keyword.value)
+            except ValueError:
+                return  # an expression: what it gives is known only later
+        for one in _as_list(wanted.get("series", [])):
+            self._one_of(text, "series", str(one), self.series)
+        if self.runs is not None:
+            count = sum(matches(run, wanted) for run in self.runs)
+            name = call.func.id if isinstance(call.func, ast.Name) else ""
+            if count == 0:
+                raise ExpressionError(f"'{text}': no run of the study is meant by this {name}")
+            if name == "val" and count > 1:
+                raise ExpressionError(f"'{text}': val needs one run, this means {count}")
+
+    def _one_of(self, text: str, what: str, name: str, known: Iterable[str]) -> None:
+        names = list(known)
+        if name not in names:
+            raise ExpressionError(
+                f"'{text}': unknown {what} {name}{nearest(name, names)}; "
+                f"allowed: {', '.join(names)}"
+            )
+
+
+def _as_list(value: Any) -> list[Any]:
+    return list(value) if isinstance(value, (list, tuple)) else [value]
+
+
+def read_finding(
+    table: Table,
+    series: Sequence[str],
+    parameters: Sequence[str],
+    runs: Sequence[PlannedRun] | None,
+    columns: Mapping[str, Column],
+) -> Finding | None:
+    """A [[finding]] of the study file; None where it is not right.
+
+    `runs` is None where other mistakes have kept runs from being planned; what depends on them is
+    not looked at then.
+    """
+    before = len(table.problems.list)
+    known = _Known(series, parameters, runs, columns)
+    table.only(_KEYS)
+    title = table.text("title", required=True)
+    values: dict[str, Expression] = {}
+    given = table.table("values")
+    for name, text in given.data.items():
+        found = _expression(table, given.at(name), text, list(values), known)
+        if found is not None:
+            values[name] = found
+    holds = [
+        _expression(table, table.at("holds"), text, list(given.data), known)
+        for text in table.texts("holds")
+    ]
+    if not table.texts("holds"):
+        table.complain("holds", "a finding needs a test", allowed='holds = ["ratio < 1.1"]')
+    text = table.text("found", required=True)
+    _check_template(table, text, {**given.data, **values})
+    if before < len(table.problems.list):
+        return None
+    return Finding(
+        title=title,
+        paper=table.text("paper"),
+        found=text,
+        note=table.text("note"),
+        values=values,
+        holds=tuple(one for one in holds if one is not None),
+    )
+
+
+def _check_template(table: Table, text: str, values: Mapping[str, Any]) -> None:
+    try:
+        for _, name, _, _ in string.Formatter().parse(text):
+            if name is not None and name not in values:
+                what = f"unknown name {{{name}}}{nearest(name, values)}"
+                table.complain("found", what, text, values)
+    except ValueError as error:
+        table.complain("found", f"is no text to fill in: {error}", text)
+
+
+def _expression(
+    table: Table,
+    place: Key,
+    text: Any,
+    names: Iterable[str],
+    known: _Known,
+) -> Expression | None:
+    if not isinstance(text, str):
+        table.problems.add(place, "must be an expression, a text", text)
+        return None
+    try:
+        found = Expression(text)
+        found.check_names(names, [*TABLE_FUNCTIONS, "col", "val"])
+        for call in found.calls:
+            if isinstance(call.func, ast.Name) and call.func.id in ("col", "val"):
+                known.check_call(found.text, call)
+    except ExpressionError as error:
+        table.problems.add(place, str(error))
+        return None
+    return found
+
+
+def matches(run: PlannedRun | TableRow, wanted: Mapping[str, Any]) -> bool:
+    """Whether a run has these parameters, series, name or label; a list allows any of its items."""
+    own = {**run.parameters, "series": run.series, "run": run.id, "label": run.label}
+    for key, value in wanted.items():
+        if key not in own or not any(_same(own[key], one) for one in _as_list(value)):
+            return False
+    return True
+
+
+def _same(one: Any, other: Any) -> bool:
+    if isinstance(one, (int, float)) and isinstance(other, (int, float)):
+        return isinstance(one, bool) == isinstance(other, bool) and math.isclose(
+            one, other, rel_tol=1e-9, abs_tol=1e-300
+        )
+    return bool(one == other)
+
+
+# ---- evaluation ------------------------------------------------------------------------------
+
+
+def evaluate(finding: Finding, rows: Sequence[TableRow]) -> dict[str, Any]:
+    """The finding as it stands in study.json."""
+    functions = {**TABLE_FUNCTIONS, **_table_functions(rows)}
+    values: dict[str, Any] = {}
+    missing: list[str] = []
+
+    def of(expression: Expression) -> Any:
+        try:
+            return expression.value(values, functions)
+        except (ExpressionError, MissingValueError) as error:
+            missing.append(str(error))
+            return None
+
+    for name, expression in finding.values.items():
+        if missing:
+            break
+        values[name] = of(expression)
+    tests: list[list[Any]] = []
+    if not missing:
+        tests = [[one.text, _truth(of(one))] for one in finding.holds]
+    found = ""
+    if not missing:
+        try:
+            found = finding.found.format(**{k: _listed(v) for k, v in values.items()})
+        except (ValueError, TypeError) as error:
+            missing.append(f"the text cannot be filled in: {error}")
+    if missing:
+        found = f"no result: {missing[0]}"
+    return {
+        "title": finding.title,
+        "paper": finding.paper,
+        "found": found,
+        "verdict": NO_RESULT if missing else verdict([bool(truth) for _, truth in tests]),
+        "note": finding.note,
+        "values": {name: _listed(value) for name, value in values.items()},
+        "holds": tests,
+    }
+
+
+def verdict(tests: Sequence[bool]) -> str:
+    """In one word or three."""
+    if all(tests):
+        return AGREES
+    return IN_PART if any(tests) else DIFFERS
+
+
+def _truth(value: Any) -> bool | None:
+    if value is None:
+        return None
+    return all(value) if isinstance(value, (Numbers, list)) else bool(value)
+
+
+def _listed(value: Any) -> Any:
+    return value.values if isinstance(value, Numbers) else value
+
+
+def _table_functions(rows: Sequence[TableRow]) -> dict[str, Callable[..., Any]]:
+    def col(column: str, **wanted: Any) -> Numbers:
+        found = {
+            row.id: row.cells.get(column)
+            for row in rows
+            if matches(row, {k: _listed(v) for k, v in wanted.items()})
+        }
+        numbers = {run: value for run, value in found.items() if not _is_missing(value)}
+        if not numbers:
+            raise MissingValueError(f"no run has a '{column}'")
+        return Numbers(numbers)
+
+    def val(column: str, **wanted: Any) -> Any:
+        found = col(column, **wanted).values
+        if len(found) != 1:
+            raise ExpressionError(f"{len(found)} runs have a '{column}', val needs one")
+        return found[0]
+
+    return {"col": col, "val": val}
+
+
+def _is_missing(value: Value) -> bool:
+    return value is None or (isinstance(value, float) and not math.isfinite(value))

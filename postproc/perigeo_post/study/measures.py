@@ -1,0 +1,357 @@
+"""The measures that a study can ask for: groups of columns of its table of runs.
+
+Each group takes one run at one state. Nothing is raised for what a run cannot tell: the value is
+None then. doc/results.md defines the quantities.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from ..measure.band import LEVEL, BandMeasure, Line
+from ..measure.curves import apparent_modulus, peak, stress_strain
+from ..measure.measures import frame_bands, largest_plastic_strain, measure_band
+from ..measure.moduli import gauge_modulus, mean_modulus
+from ..measure.pattern import pattern_of
+from ..measure.quality import (
+    kinetic_bound,
+    kinetic_curve,
+    kinetic_state,
+    largest_after,
+    reaction_gap,
+)
+from ..measure.softening import softening_branch, strain_rate
+from ..read.errors import PostError
+from ..read.run import Frame, Run
+from .types import Column, Measure, State, Value
+
+STRAINS = {"0_5": 0.005, "1_0": 0.010, "1_5": 0.015}  # at which the stress is listed
+
+Values = dict[str, Value]
+
+
+def _tried(what: Callable[[], Mapping[str, Value] | None]) -> Values:
+    """What could be measured; nothing where the result does not hold it."""
+    try:
+        return dict(what() or {})
+    except (PostError, ValueError, ArithmeticError, np.linalg.LinAlgError):
+        return {}
+
+
+def _measure(columns: Mapping[str, Column], *parts: Callable[[Run, State], Values]) -> Measure:
+    """A group whose columns are filled by several parts, each of which may fail by itself."""
+
+    def take(run: Run, state: State) -> Values:
+        found: Values = {}
+        for part in parts:
+            found.update(_tried(lambda part=part: part(run, state)))  # type: ignore[misc]
+        return {name: _plain(found.get(name)) for name in columns}
+
+    return Measure(columns, take)
+
+
+def _plain(value: Value) -> Value:
+    """Python's own numbers, None for what is not finite."""
+    if value is None or isinstance(value, (bool, str, int)):
+        return value
+    number = float(value)
+    return number if np.isfinite(number) else None
+
+
+def frame_of(run: Run, state: State) -> Frame:
+    """The frame of a state: the nearest to its strain, or the last."""
+    return run.frame(state.strain)
+
+
+# ---- curve ---------------------------------------------------------------------------------
+
+_CURVE = {
+    "peak_stress": Column("Pa", "largest axial stress (reaction of the first platen over width)"),
+    "strain_at_peak": Column("1", "nominal strain at the peak stress"),
+    "state_strain": Column("1", "nominal strain of the frame at which fields are measured"),
+    "stress_at_state": Column("Pa", "axial stress at the time of that frame"),
+    "last_strain": Column("1", "nominal strain at the end of the run"),
+    "last_stress": Column("Pa", "axial stress at the end of the run"),
+    "largest_alpha": Column("1", "largest equivalent plastic strain of the body in that frame"),
+}
+
+
+def _curve(run: Run, state: State) -> Values:
+    curve = stress_strain(run)
+    stress, strain = peak(curve)
+    found: Values = {"peak_stress": stress, "strain_at_peak": strain}
+    if len(curve.x):
+        found.update(last_strain=float(curve.x[-1]), last_stress=float(curve.y[-1]))
+    return found
+
+
+def _curve_at_state(run: Run, state: State) -> Values:
+    frame = frame_of(run, state)
+    stress = stress_strain(run).y
+    time = run.history()["time"][: len(stress)]
+    return {"stress_at_state": float(np.interp(frame.time, time, stress))}
+
+
+def _frame_numbers(run: Run, state: State) -> Values:
+    frame = frame_of(run, state)
+    return {"state_strain": frame.strain, "largest_alpha": largest_plastic_strain(frame)}
+
+
+# ---- modulus -------------------------------------------------------------------------------
+
+_NU = "times 1 - nu^2, from 0.02 to 0.1 % strain"
+_MODULUS = {
+    "modulus_platen": Column("Pa", f"slope of platen reaction over width against strain, {_NU}"),
+    "modulus_gauge": Column(
+        "Pa", f"slope of the same stress against the strain between two lines inside, {_NU}"
+    ),
+    "modulus_gauge_rows": Column(
+        "Pa", "as modulus_gauge, but from single rows of points, which carry zero-energy modes"
+    ),
+    "modulus_mean": Column("Pa", f"slope of mean stress against mean strain of the body, {_NU}"),
+    "modulus_mean_corrected": Column(
+        "Pa", "as modulus_mean, without what the mean lateral stress adds to the axial stress"
+    ),
+    "modulus_target": Column("Pa", "Young's modulus of the input"),
+}
+
+
+def _modulus_parts() -> list[Callable[[Run, State], Values]]:
+    return [
+        lambda run, _: {"modulus_platen": apparent_modulus(run).value},
+        lambda run, _: {"modulus_gauge": gauge_modulus(run).value},
+        lambda run, _: {"modulus_gauge_rows": gauge_modulus(run, thick=False).value},
+        lambda run, _: {"modulus_mean": mean_modulus(run).value},
+        lambda run, _: {"modulus_mean_corrected": mean_modulus(run, True).value},
+        lambda run, _: {"modulus_target": run.number("material.youngs_modulus")},
+    ]
+
+
+# ---- band ----------------------------------------------------------------------------------
+
+_BAND = {
+    "width": Column("m", "width of the band at 10 % of its peak, along the line of the profile"),
+    "width_uncertainty": Column("m", "half a spacing at each edge"),
+    "width_closed": Column("1", "false: the profile ends before 10 %, the width is a lower bound"),
+    "width_over_horizon": Column("1", "width over horizon"),
+    "width_over_horizon_uncertainty": Column("1", "width_uncertainty over horizon"),
+    "width_over_spacing": Column("1", "width over spacing"),
+    "width_median": Column("m", "median width along the band, at right angles to it"),
+    "width_spread": Column("m", "half the distance of the quartiles of those widths"),
+    "peak_alpha": Column("1", "peak of the profile"),
+    "angle": Column("degrees", "angle between the prevailing band and the loading axis"),
+    "angle_uncertainty": Column("degrees", "one spacing over the length fitted"),
+    "direction": Column("1", "diagonal of the prevailing band, rising or falling"),
+    "band_ratio": Column("1", "weaker over stronger band, plastic strain so far"),
+    "band_ratio_growing": Column("1", "the same of what was added since the frame before"),
+    "pattern": Column("1", "X: weaker band from 0.25 of the stronger on; single; diffuse; none"),
+    "pattern_growing": Column("1", "the same of what was added, X from 0.5 on"),
+    "profile_mirrored": Column("1", "true: the given line was mirrored to cross the band"),
+}
+
+
+def line_meeting(line: Line, run: Run, along: Line) -> tuple[Line, bool]:
+    """The line, or its mirror image in the body where the line runs along the band, not across.
+
+    Mirrored is the coordinate across the loading axis. The second value says whether it was.
+    """
+    ends, band = np.array(line), np.array(along)
+    one, other = ends[1] - ends[0], band[1] - band[0]
+    cosine = abs(float(one @ other)) / float(np.hypot(*one) * np.hypot(*other))
+    if cosine <= np.sqrt(0.5):
+        return line, False
+    k = 1 if run.strain_axis == "x" else 0
+    ends[:, k] = run.lower[k] + run.upper[k] - ends[:, k]
+    return ((float(ends[0, 0]), float(ends[0, 1])), (float(ends[1, 0]), float(ends[1, 1]))), True
+
+
+def band_at(run: Run, state: State, level: float = LEVEL) -> tuple[BandMeasure, bool]:
+    """The prevailing band of a state, along its line; and whether the line was mirrored."""
+    frame = frame_of(run, state)
+    if state.line is None:
+        return measure_band(run, number=frame.number, level=level), False
+    bands = frame_bands(frame)
+    line, mirrored = line_meeting(state.line, run, bands.prevailing.line)
+    return measure_band(run, number=frame.number, line=line, level=level), mirrored
+
+
+def _band(run: Run, state: State) -> Values:
+    found, mirrored = band_at(run, state)
+    width, strong = found.width, found.bands.prevailing
+    return {
+        "width": width.width,
+        "width_uncertainty": width.uncertainty,
+        "width_closed": width.closed,
+        "width_over_horizon": width.width / found.horizon,
+        "width_over_horizon_uncertainty": width.uncertainty / found.horizon,
+        "width_over_spacing": width.width / found.spacing,
+        "width_median": strong.width_median,
+        "width_spread": strong.width_spread,
+        "peak_alpha": width.peak,
+        "angle": strong.angle,
+        "angle_uncertainty": strong.angle_uncertainty,
+        "direction": strong.direction,
+        "profile_mirrored": mirrored,
+    }
+
+
+def _pattern(run: Run, state: State) -> Values:
+    found = pattern_of(frame_of(run, state))
+    return {
+        "band_ratio": found.ratio,
+        "band_ratio_growing": found.ratio_growing,
+        "pattern": found.name,
+        "pattern_growing": found.growing,
+    }
+
+
+# ---- quality -------------------------------------------------------------------------------
+
+_QUALITY = {
+    "kinetic_ratio": Column("1", "kinetic energy of v - v_ref over internal energy at the state"),
+    "kinetic_ratio_largest": Column("1", "largest of the frames from 0.05 % strain on"),
+    "kinetic_bound_peak": Column("1", "upper bound of that ratio at the peak stress"),
+    "kinetic_bound_largest": Column("1", "largest upper bound from 0.05 % strain on"),
+    "reaction_gap": Column(
+        "1", "difference of the platen reactions over the largest, at the state"
+    ),
+    "reaction_gap_peak": Column("1", "the same at the peak stress"),
+    "reaction_gap_largest": Column("1", "largest from 0.05 % strain on"),
+    "energy_error_largest": Column("1", "largest error of the energy balance of the program"),
+    "zero_energy_largest": Column("1", "largest zero-energy measure of the body at the state"),
+}
+
+
+def _kinetic(run: Run, state: State) -> Values:
+    return {
+        "kinetic_ratio": kinetic_state(frame_of(run, state)).ratio,
+        "kinetic_ratio_largest": largest_after(kinetic_curve(run)),
+    }
+
+
+def _bound(run: Run, state: State) -> Values:
+    curve = kinetic_bound(run)
+    _, at = peak(stress_strain(run))
+    return {"kinetic_bound_peak": curve.at(at), "kinetic_bound_largest": largest_after(curve)}
+
+
+def _gap(run: Run, state: State) -> Values:
+    curve = reaction_gap(run)
+    _, at = peak(stress_strain(run))
+    return {
+        "reaction_gap": curve.at(frame_of(run, state).strain),
+        "reaction_gap_peak": curve.at(at),
+        "reaction_gap_largest": largest_after(curve),
+    }
+
+
+def _balance(run: Run, state: State) -> Values:
+    return {"energy_error_largest": float(np.nanmax(np.abs(run.history()["energy_error"])))}
+
+
+def _zero_energy(run: Run, state: State) -> Values:
+    return {"zero_energy_largest": float(frame_of(run, state)["zero_energy"][run.body].max())}
+
+
+# ---- softening -----------------------------------------------------------------------------
+
+_SOFTENING = {
+    "strain_at_90": Column("1", "nominal strain where the stress has fallen to 90 % of its peak"),
+    "strain_at_50": Column("1", "nominal strain where it has fallen to 50 %"),
+    "softening_slope": Column("Pa", "fall of stress over strain between 90 and 50 % of the peak"),
+    "softening_displacement": Column("m", "approach of the platens between 90 and 50 %"),
+    "brittleness": Column("1", "softening_slope over the elastic slope"),
+    "stress_ratio": Column("1", "axial stress at the state over its peak"),
+    **{
+        f"stress_{name}": Column("Pa", f"axial stress at {100.0 * s:g} % nominal strain")
+        for name, s in STRAINS.items()
+    },
+    "dissipated_energy": Column("J/m", "plastic work up to the state"),
+    "dissipated_density": Column("J/m^3", "the same over the area of the body"),
+    "strain_rate": Column("1/s", "mean rate of the nominal strain"),
+    "approach_velocity": Column("m/s", "mean velocity at which the platens approach"),
+}
+
+
+def _branch(run: Run, state: State) -> Values:
+    found = softening_branch(run)
+    return {
+        "strain_at_90": found.strain_upper,
+        "strain_at_50": found.strain_lower,
+        "softening_slope": found.slope,
+        "softening_displacement": found.displacement,
+    }
+
+
+def _brittleness(run: Run, state: State) -> Values:
+    return {"brittleness": softening_branch(run).slope / apparent_modulus(run).slope}
+
+
+def _stresses(run: Run, state: State) -> Values:
+    curve = stress_strain(run)
+    return {f"stress_{name}": curve.at(strain) for name, strain in STRAINS.items()}
+
+
+def _stress_ratio(run: Run, state: State) -> Values:
+    stress = _curve_at_state(run, state)["stress_at_state"]
+    assert isinstance(stress, float)
+    return {"stress_ratio": stress / peak(stress_strain(run))[0]}
+
+
+def _dissipation(run: Run, state: State) -> Values:
+    history = run.history()
+    work = np.interp(frame_of(run, state).time, history["time"], history["plastic_dissipation"])
+    area = float(run.volumes[run.body].sum())
+    return {"dissipated_energy": float(work), "dissipated_density": float(work) / area}
+
+
+def _rate(run: Run, state: State) -> Values:
+    rate = strain_rate(run)
+    return {"strain_rate": rate, "approach_velocity": rate * run.length}
+
+
+# ---- field ---------------------------------------------------------------------------------
+
+_FIELD = {
+    "yield_stress_mean": Column("Pa", "mean initial yield stress of the body, over its volume"),
+    "yield_stress_variation": Column("1", "its coefficient of variation"),
+    "yield_stress_least": Column("Pa", "its smallest value"),
+    "yield_stress_band": Column("Pa", "its mean where the plastic strain exceeds half the peak"),
+}
+
+
+def _field(run: Run, state: State) -> Values:
+    values = run.last_frame["yield_stress"][run.body]
+    volumes = run.volumes[run.body]
+    mean = float(np.average(values, weights=volumes))
+    spread = float(np.sqrt(np.average((values - mean) ** 2, weights=volumes)))
+    return {
+        "yield_stress_mean": mean,
+        "yield_stress_variation": spread / mean,
+        "yield_stress_least": float(values.min()),
+    }
+
+
+def _field_in_band(run: Run, state: State) -> Values:
+    values = run.last_frame["yield_stress"][run.body]
+    alpha = frame_of(run, state)["plastic_strain"][run.body]
+    inside = alpha > 0.5 * measure_band(run, number=frame_of(run, state).number).width.peak
+    return {
+        "yield_stress_band": float(
+            np.average(values[inside], weights=run.volumes[run.body][inside])
+        )
+    }
+
+
+MEASURES: dict[str, Measure] = {
+    "curve": _measure(_CURVE, _curve, _curve_at_state, _frame_numbers),
+    "modulus": _measure(_MODULUS, *_modulus_parts()),
+    "band": _measure(_BAND, _band, _pattern),
+    "quality": _measure(_QUALITY, _kinetic, _bound, _gap, _balance, _zero_energy),
+    "softening": _measure(
+        _SOFTENING, _branch, _brittleness, _stresses, _stress_ratio, _dissipation, _rate
+    ),
+    "field": _measure(_FIELD, _field, _field_in_band),
+}

@@ -1,0 +1,308 @@
+"""What comes out of a study: measures, the table of runs, figures, findings, study.json."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import platform
+import subprocess
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from datetime import datetime, timezone
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+
+from ..draw.style import save_figure
+from ..measure.export import plain, write_rows
+from ..read.errors import PostError
+from ..read.run import Run
+from .file import FigureSpec, Kinds, Study
+from .findings import TableRow, evaluate
+from .jobs import Job, cores, write_whole
+from .plan import PlannedRun
+from .types import StudyRun, Value
+
+SCHEMA = "perigeo study"
+SCHEMA_VERSION = 1
+# What the numbers and verdicts of a study come from.
+MEASURING = (
+    "read/*.py",
+    "measure/*.py",
+    "study/measures.py",
+    "study/expressions.py",
+    "study/findings.py",
+)
+STATUS = {"done": "done", "failed": "failed"}  # of a job; anything else is missing
+
+
+@dataclass
+class Outcome:
+    """A study with its runs, and what went wrong on the way."""
+
+    study: Study
+    jobs: Mapping[str, Job]  # by the name of the run; runs that compute the same share one
+    program_version: str
+    rows: dict[str, dict[str, Value]] = field(default_factory=dict)  # measured, by run
+    runs: list[StudyRun] = field(default_factory=list)
+    drawn: list[FigureSpec] = field(default_factory=list)
+    problems: list[str] = field(default_factory=list)
+
+    @property
+    def name(self) -> str:
+        return self.study.name
+
+    def status(self, run: PlannedRun) -> str:
+        return STATUS.get(self.jobs[run.id].status, "missing")
+
+    @property
+    def distinct(self) -> list[Job]:
+        """Every job once."""
+        return list({id(job): job for job in self.jobs.values()}.values())
+
+
+# ---- measures --------------------------------------------------------------------------------
+
+
+def measure(outcome: Outcome, kinds: Kinds) -> None:
+    """Take the measures of all runs that are done."""
+    for planned in outcome.study.runs:
+        job = outcome.jobs[planned.id]
+        row: dict[str, Value] = {}
+        if job.record is not None:
+            row.update(points=job.record.points, steps=job.record.steps)
+        outcome.rows[planned.id] = row
+        if job.status != "done":
+            continue
+        run = Run(job.result)
+        for name in planned.measures:
+            one = kinds.measures[name]
+            found: Mapping[str, Value] = {}
+            try:
+                found = one.take(run, planned.state)
+            except PostError as error:
+                outcome.problems.append(f"{planned.id}: {name} cannot be measured: {error}")
+            except Exception as error:  # one measure must not cost the others
+                what = f"{type(error).__name__}: {error}"
+                outcome.problems.append(f"{planned.id}: {name} cannot be measured: {what}")
+            row.update({column: plain(found.get(column)) for column in one.columns})
+        outcome.runs.append(
+            StudyRun(
+                id=planned.id,
+                label=planned.label,
+                series=planned.series,
+                parameters=planned.parameters,
+                row=row,
+                run=run,
+                state=planned.state,
+            )
+        )
+
+
+def _cells(outcome: Outcome, run: PlannedRun) -> dict[str, Value]:
+    """A row of the table, without what has no value."""
+    return {
+        "study": outcome.name,
+        "series": run.series,
+        "run": run.id,
+        "label": run.label,
+        "status": outcome.status(run),
+        **run.parameters,
+        **outcome.rows.get(run.id, {}),
+    }
+
+
+def write_tables(outcome: Outcome, folder: Path) -> None:
+    """NAME.csv, one row a run, and NAME_columns.csv, which says what its columns hold."""
+    columns = outcome.study.columns
+    rows = []
+    for run in outcome.study.runs:
+        cells = _cells(outcome, run)
+        rows.append({name: cells.get(name) for name in columns})
+    _write_csv(folder / f"{outcome.name}.csv", rows)
+    about = [
+        {"column": name, "unit": column.unit, "description": column.description}
+        for name, column in columns.items()
+    ]
+    _write_csv(folder / f"{outcome.name}_columns.csv", about)
+
+
+def _write_csv(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
+    new = path.with_name(path.name + ".new")
+    write_rows(new, rows, {})
+    os.replace(new, path)
+
+
+# ---- figures ---------------------------------------------------------------------------------
+
+
+def draw(outcome: Outcome, kinds: Kinds, folder: Path) -> None:
+    """Every figure as PNG, PDF and CSV; one that cannot be drawn does not stop the others."""
+    for spec in outcome.study.figures:
+        runs = [run for run in outcome.runs if run.series in spec.series]
+        try:
+            if not runs:
+                raise PostError("none of its runs is done")
+            drawing = kinds.figures[spec.kind](runs, spec.options, outcome.study.columns)
+            save_figure(drawing.figure, folder / f"{spec.name}.png")
+            save_figure(drawing.figure, folder / f"{spec.name}.pdf")
+            _write_csv(folder / f"{spec.name}.csv", drawing.rows)
+            outcome.drawn.append(spec)
+        except PostError as error:
+            outcome.problems.append(f"figure {spec.name} cannot be drawn: {error}")
+        except Exception as error:  # one figure must not cost the others
+            what = f"{type(error).__name__}: {error}"
+            outcome.problems.append(f"figure {spec.name} cannot be drawn: {what}")
+
+
+# ---- study.json ------------------------------------------------------------------------------
+
+
+def report(outcome: Outcome, fingerprint: str) -> dict[str, Any]:
+    """What study.json holds: paths are relative to its folder."""
+    study = outcome.study
+    rows = [
+        TableRow(run.id, run.label, run.series, run.parameters, _cells(outcome, run))
+        for run in study.runs
+    ]
+    complete = all(outcome.status(run) == "done" for run in study.runs)
+    return {
+        "schema": SCHEMA,
+        "schema_version": SCHEMA_VERSION,
+        "name": study.name,
+        "title": study.title,
+        "question": study.question,
+        "file": study.path.name,
+        "base": study.base.name,
+        "created": datetime.now(timezone.utc).isoformat(timespec="seconds"),
+        "fingerprint": fingerprint,
+        "program_version": outcome.program_version,
+        "machine": machine(),
+        "complete": complete and len(outcome.drawn) == len(study.figures),
+        "seconds": sum(job.record.seconds for job in outcome.distinct if job.record),
+        "series": [{"name": name, "title": title} for name, title in study.series],
+        "runs": [_run_entry(outcome, run) for run in study.runs],
+        "units": {name: column.unit for name, column in study.columns.items()},
+        "descriptions": {name: column.description for name, column in study.columns.items()},
+        "figures": [
+            {
+                "name": spec.name,
+                **{ending: f"{spec.name}.{ending}" for ending in ("png", "pdf", "csv")},
+                "title": spec.title,
+                "caption": spec.caption,
+                "alt": spec.alt,
+            }
+            for spec in outcome.drawn
+        ],
+        "findings": [evaluate(finding, rows) for finding in study.findings],
+        "problems": list(outcome.problems),
+        "csv": f"{study.name}.csv",
+    }
+
+
+def _run_entry(outcome: Outcome, run: PlannedRun) -> dict[str, Any]:
+    job = outcome.jobs[run.id]
+    record = job.record
+    place = f"runs/{job.id}/{job.id}"
+    return {
+        "id": run.id,
+        "series": run.series,
+        "label": run.label,
+        "parameters": dict(run.parameters),
+        "status": outcome.status(run),
+        "exit_status": record.exit_status if record else None,
+        "message": record.message if record else "",
+        "input": f"{place}.nml",
+        "result": f"{place}.h5",
+        "program_version": record.program_version if record else None,
+        "input_sha256": record.input_sha256 if record else None,
+        "seconds": record.seconds if record else None,
+        "threads": record.threads if record else None,
+        "points": record.points if record else None,
+        "steps": record.steps if record else None,
+        "row": outcome.rows.get(run.id, {}),
+    }
+
+
+def write_report(data: Mapping[str, Any], folder: Path) -> None:
+    """Write study.json."""
+    text = json.dumps(plain(data), indent=1, ensure_ascii=False, allow_nan=False)
+    write_whole(folder / "study.json", text + "\n")
+
+
+def read_report(folder: Path) -> dict[str, Any] | None:
+    """What study.json holds, None where it is not there or not ours."""
+    try:
+        data = json.loads((folder / "study.json").read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return None
+    return data if isinstance(data, dict) and data.get("schema") == SCHEMA else None
+
+
+def machine() -> dict[str, Any]:
+    """The processor, its cores and the system."""
+    return {
+        "processor": _processor(),
+        "cores": cores(),
+        "system": f"{platform.system()} {platform.machine()}".strip(),
+    }
+
+
+def _processor() -> str:
+    try:
+        text = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace")
+        names = [line.partition(":")[2] for line in text.splitlines() if "model name" in line]
+        if names:
+            return names[0].strip()
+    except OSError:
+        pass
+    try:
+        done = subprocess.run(
+            ["sysctl", "-n", "machdep.cpu.brand_string"],
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        if done.returncode == 0 and done.stdout.strip():
+            return done.stdout.strip()
+    except OSError:
+        pass
+    return platform.processor() or platform.machine() or "unknown"
+
+
+def measuring_files() -> list[Path]:
+    """The sources from which the numbers of a study come."""
+    package = Path(__file__).parents[1]
+    return sorted(path for pattern in MEASURING for path in package.glob(pattern))
+
+
+def fingerprint(outcome: Outcome) -> str:
+    """Changes with anything that the tables depend on: the study, its results, what measures them.
+
+    Not with how figures are drawn or what the command line says: --figures-only draws anew.
+    """
+    digest = hashlib.sha256(outcome.study.path.read_bytes())
+    digest.update(f"{np.__version__} {matplotlib.__version__}".encode())
+    for path in measuring_files():
+        digest.update(path.read_bytes())
+    for run in outcome.study.runs:
+        job = outcome.jobs[run.id]
+        record = job.record
+        seen = [run.id, run.label, job.identity, job.status]
+        if record is not None:
+            seen += [record.program, record.message, record.input_sha256]
+            seen += [f"{record.seconds}"]
+        digest.update("\0".join(seen).encode())
+    return digest.hexdigest()
+
+
+def is_up_to_date(data: Mapping[str, Any] | None, mark: str, folder: Path) -> bool:
+    """Whether tables and figures of an earlier call still hold."""
+    if data is None or data.get("fingerprint") != mark or data.get("problems"):
+        return False
+    files = [data["csv"], f"{data['name']}_columns.csv"]
+    files += [figure[kind] for figure in data["figures"] for kind in ("png", "pdf", "csv")]
+    return all((folder / name).is_file() for name in files)
