@@ -6,7 +6,8 @@
 module damage_law
   use pd_elastic, only: isotropic_stress_block
   use pd_kinds, only: n_block, wp
-  use pd_law, only: flow_t, law_points_t, law_t, remembered_t
+  use pd_labels, only: label_t
+  use pd_law, only: flow_t, law_points_t, law_t
   implicit none
   private
 
@@ -28,11 +29,11 @@ module damage_law
 contains
 
   pure function remembers() result(columns)
-    type(remembered_t), allocatable :: columns(:)
+    type(label_t), allocatable :: columns(:)
 
     allocate (columns(2))
-    columns(1) = remembered_t('largest_strain', '1', 'largest equivalent strain so far')
-    columns(2) = remembered_t('damage', '1', 'part of the stiffness that is lost')
+    columns(1) = label_t('largest_strain', '1', 'largest equivalent strain so far')
+    columns(2) = label_t('damage', '1', 'part of the stiffness that is lost')
   end function remembers
 
   !> What is dissipated is (1/2) G kappa_0 d kappa: half of the work on the plateau.
@@ -46,7 +47,7 @@ contains
     integer  :: i, b
 
     call isotropic_stress_block(self%lambda, self%shear_modulus, first, lo, hi, strain, whole)
-    flow%any = .true.
+    flow%n = hi - lo + 1
     associate (largest => points%history(:, 1), damage => points%history(:, 2))
       do i = lo, hi
         b = i - first + 1
@@ -56,7 +57,8 @@ contains
         kappa = max(before, largest(i))
         damage(i) = 1.0_wp - self%threshold / kappa
         points%stress(i, :) = (1.0_wp - damage(i)) * whole(b, :)
-        flow%dissipated(b) = 0.5_wp * self%shear_modulus * self%threshold * (kappa - before)
+        flow%rows(i - lo + 1) = i
+        flow%dissipated(i - lo + 1) = 0.5_wp * self%shear_modulus * self%threshold * (kappa - before)
       end do
     end associate
   end subroutine stress_block

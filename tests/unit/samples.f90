@@ -129,7 +129,6 @@ contains
     body%n = n * n
     allocate (body%position(n * n, 2), body%volume(n * n))
     allocate (body%boundary(n * n), source=0)
-    body%points = [(i, i=1, n * n)]
     call random%fill(1.0_wp, wobble)
     do iy = 1, n
       do ix = 1, n
@@ -215,7 +214,7 @@ contains
     history = point%history(1, :)
     if (.not. present(dissipated)) return
     dissipated = 0.0_wp
-    if (flow%any) dissipated = flow%dissipated(1)
+    if (flow%n > 0) dissipated = flow%dissipated(1)
   end subroutine stress_at_point
 
   !> Operators of a body with their K^-1; control of strength g where that is above 0.
