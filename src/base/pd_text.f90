@@ -5,7 +5,7 @@ module pd_text
   implicit none
   private
 
-  public :: lower_case, is_name, nearest_name, quoted_list, shortened
+  public :: numbers_text, lower_case, is_name, nearest_name, quoted_list, shortened
   public :: number_text, integer_text, read_number, read_integer
 
   character(*), parameter :: digits = '0123456789'
@@ -266,5 +266,23 @@ contains
       if (status /= 0) problem = 'not a whole number'
     end if
   end subroutine read_integer
+
+  !> Numbers separated by commas, each as `number_text` writes it.
+  pure function numbers_text(numbers) result(text)
+    real(wp), intent(in) :: numbers(:)
+    character(:), allocatable :: text
+    character(26 * max(1, size(numbers))) :: buffer
+    character(:), allocatable :: number
+    integer :: i, n
+
+    n = 0
+    do i = 1, size(numbers)
+      number = number_text(numbers(i))
+      if (i < size(numbers)) number = number//', '
+      buffer(n + 1:n + len(number)) = number
+      n = n + len(number)
+    end do
+    text = buffer(:n)
+  end function numbers_text
 
 end module pd_text

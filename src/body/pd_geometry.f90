@@ -26,6 +26,8 @@ module pd_geometry
     real(wp), allocatable :: position(:, :)     !! X (n,2) [m]
     real(wp), allocatable :: volume(:)          !! V (n) per unit thickness [m^2]
     integer,  allocatable :: boundary(:)        !! 0: body, k: fictitious point of boundary k (n)
+    integer,  allocatable :: part(:)            !! number of the rectangle that a point lies in, or
+                                                !! that its layer continues (n)
     integer,  allocatable :: place(:, :)        !! column and row on the lattice (n,2); not allocated:
                                                 !! no lattice
     real(wp) :: lower(2) = 0.0_wp               !! corners of the extent of the body without
@@ -51,6 +53,7 @@ module pd_geometry
   !> of the body.
   type :: places_t
     integer, allocatable :: owner(:, :)         !! `empty`, or as body_t%boundary
+    integer, allocatable :: part(:, :)          !! number of the rectangle; 0: none
     logical, allocatable :: filled(:, :)        !! the square up and right of a node is material
     integer, allocatable :: number(:, :)        !! of the point at a place, 0: none
   end type places_t
@@ -103,6 +106,7 @@ contains
       end if
     end do
     call number_points(places, origin, lattice, body)
+    call find_parts(places, counts, lattice, body)
     call find_sides(places, origin, counts, lattice, body)
   end subroutine lattice_body
 
@@ -116,6 +120,8 @@ contains
 
     margin = lattice%rows + 1
     allocate (places%owner(-margin:counts(1) + margin, -margin:counts(2) + margin), source=empty)
+    allocate (places%part, mold=places%owner)
+    places%part = 0
     allocate (places%filled(-margin:counts(1) + margin, -margin:counts(2) + margin), &
       source=.false.)
     do k = 1, size(first, 2)
@@ -124,6 +130,7 @@ contains
       places%filled(a(1):b(1), a(2):b(2)) = .true.
       if (.not. lattice%cells) b = b + 1
       places%owner(a(1):b(1), a(2):b(2)) = 0
+      places%part(a(1):b(1), a(2):b(2)) = k
     end do
   end subroutine fill_rectangles
 
@@ -206,6 +213,22 @@ contains
     end subroutine fill_row
 
   end subroutine fill_layer
+
+  !> The rectangle of every point: the last one that holds it. A layer continues what is beside it.
+  pure subroutine find_parts(places, counts, lattice, body)
+    type(places_t),  intent(in)    :: places
+    integer,         intent(in)    :: counts(2)
+    type(lattice_t), intent(in)    :: lattice
+    type(body_t),    intent(inout) :: body
+    integer :: i, outer(2), beside(2)
+
+    outer = merge(counts - 1, counts, lattice%cells)
+    allocate (body%part(body%n))
+    do i = 1, body%n
+      beside = min(outer, max(0, body%place(i, :)))
+      body%part(i) = max(1, places%part(beside(1), beside(2)))
+    end do
+  end subroutine find_parts
 
   !> Number the occupied places row by row, and give them positions and volumes.
   subroutine number_points(places, origin, lattice, body)

@@ -174,7 +174,7 @@ contains
   pure subroutine mark_free(position, volume, density, boundaries, free)
     real(wp),         intent(in)    :: position(:, :)   !! X (n,2) [m]
     real(wp),         intent(in)    :: volume(:)        !! V (n) [m^2]
-    real(wp),         intent(in)    :: density          !! rho [kg/m^3]
+    real(wp),         intent(in)    :: density(:)       !! rho (n) [kg/m^3]
     type(boundary_t), intent(inout) :: boundaries(:)
     real(wp),         intent(inout) :: free(:, :)       !! (n,2); in: 1 where there is a point
     integer :: b, k, p
@@ -186,11 +186,11 @@ contains
           p = boundary%points(k)
           where (boundary%prescribed) free(p, :) = 0.0_wp
           if (boundary%affine) then
-            boundary%mode_mass(1) = boundary%mode_mass(1) + density * volume(p) &
+            boundary%mode_mass(1) = boundary%mode_mass(1) + density(p) * volume(p) &
               * sum(affine_mode(boundary%gradient, position(p, :))**2)
           else
             where (boundary%prescribed) &
-              boundary%mode_mass = boundary%mode_mass + density * volume(p)
+              boundary%mode_mass = boundary%mode_mass + density(p) * volume(p)
           end if
         end do
       end associate

@@ -80,8 +80,8 @@ contains
     do k = 1, size(model%boundaries)
       model%boundaries(k)%points = model%operators%storage%row(model%boundaries(k)%points)
     end do
-    call mark_free(model%points%position, model%points%volume, input%material%density, &
-      model%boundaries, model%points%free)
+    call mark_free(model%points%position, model%points%volume, &
+      model%materials%density_of(model%operators%n), model%boundaries, model%points%free)
 
     model%damping = input%integration%damping
     if (input%platens(1) == 0) return

@@ -282,7 +282,7 @@ def test_a_disk_too_small_for_the_frames_shows_at_the_start(program, tmp_path):
 def test_a_disk_that_fills_up_keeps_what_was_written(program, tmp_path):
     text = changed(SPECIMEN, history_count="5000", final_strain="0.05")
     text = text.replace("frame_strains = 0.004, 0.01", "frame_strains = 1.0e-4, 0.05")
-    done = run_with_little_space(program, tmp_path, text, 300_000)
+    done = run_with_little_space(program, tmp_path, text, 1_200_000)
     assert done.returncode == 5, done.stderr
     assert "case_history.csv" in done.stderr
     lines = (tmp_path / "out" / "case_history.csv").read_text().splitlines()
