@@ -52,13 +52,15 @@ contains
       do i = lo, hi
         b = i - first + 1
         before = max(self%threshold, largest(i))
-        kappa = sqrt((sum(whole(b, :) * strain(b, :)) + whole(b, 4) * strain(b, 4)) / self%shear_modulus)
+        kappa = sqrt((sum(whole(b, :) * strain(b, :)) + whole(b, 4) * strain(b, 4)) &
+          / self%shear_modulus)
         largest(i) = max(largest(i), kappa)
         kappa = max(before, largest(i))
         damage(i) = 1.0_wp - self%threshold / kappa
         points%stress(i, :) = (1.0_wp - damage(i)) * whole(b, :)
         flow%rows(i - lo + 1) = i
-        flow%dissipated(i - lo + 1) = 0.5_wp * self%shear_modulus * self%threshold * (kappa - before)
+        flow%dissipated(i - lo + 1) = 0.5_wp * self%shear_modulus * self%threshold &
+          * (kappa - before)
       end do
     end associate
   end subroutine stress_block

@@ -184,16 +184,18 @@ contains
     class(law_t),   intent(in), optional :: law
     type(blocks_t), intent(in), optional :: blocks
     type(materials_t) :: materials
+    type(material_t)  :: material
     real(wp) :: nu
     integer  :: i
 
     nu = 0.3_wp
     if (present(poissons_ratio)) nu = poissons_ratio
     if (present(law)) then
-      materials = materials_of([(1, i=1, n)], new_material(law), blocks=blocks)
+      material = new_material(law)
     else
-      materials = materials_of([(1, i=1, n)], new_material(new_elastic(50.0e6_wp, nu)), blocks=blocks)
+      material = new_material(new_elastic(50.0e6_wp, nu))
     end if
+    materials = materials_of([(1, i=1, n)], material, blocks=blocks)
   end function material_of
 
   !> Stress of one point by a law; what it remembers goes from step n to n+1.
