@@ -18,6 +18,7 @@ from perigeo_post import (
     SchemaError,
     read_history,
 )
+from perigeo_post.read.fields import label_of
 
 
 def test_a_complete_run_tells_what_it_is(result: Path) -> None:
@@ -275,6 +276,11 @@ def test_components_stand_in_the_order_of_the_file(result: Path) -> None:
     assert "first_piola_zz" not in run.field_names
     for name in run.field_names:
         assert len(frame[name]) == len(run.positions)
+
+
+def test_only_components_are_labelled_as_such() -> None:
+    assert label_of("strain_xy") == "Strain $E_{xy}$"
+    assert label_of("strain_rate") == "Strain rate"
 
 
 def test_what_a_tensor_cannot_give_is_not_offered(result: Path) -> None:
