@@ -54,7 +54,7 @@ contains
     type(outcome_t), intent(inout) :: outcome
     type(error_list_t) :: errors, input_errors
 
-    call read_input(options%input_path, run%input, errors)
+    call read_input(options%input_path, run%input, errors, options%settings)
     call outcome%end_if_any(errors, exit_input)
     if (outcome%done) return
     if (options%output_dir /= '') run%input%run%output_dir = options%output_dir

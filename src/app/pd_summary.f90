@@ -66,7 +66,7 @@ contains
       call summary%add('horizon', number(model%delta)//' m, spacing '// &
         number(model%spacing)//' m: m = '//number(model%delta / model%spacing))
       call summary%add('wave speed', 'c_p = '//number(model%materials%wave_speed())//' m/s')
-      call add_field(input%random_field, input%material, model, summary)
+      call add_field(input%random_field, input%materials(1), model, summary)
       courant = model%spacing / model%materials%wave_speed()
       text = number(clock%time_step)//' s = '//number(clock%time_step / courant)// &
         ' dx/c_p, rule '//input%integration%time_step_rule

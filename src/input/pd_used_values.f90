@@ -2,29 +2,36 @@
 !> what differs from the run that a checkpoint belongs to.
 module pd_used_values
   use pd_errors, only: error_list_t
-  use pd_input_types, only: boundary_input_t, input_t, pressure_input_t
+  use pd_input_types, only: input_t
+  use pd_keys, only: group_key_t, key_t, key_visitor_t
   use pd_kinds, only: wp
   use pd_text, only: integer_text, number_text, read_number, shortened
   implicit none
   private
 
-  public :: used_values, compare_used
+  public :: used_values, compare_used, used_list_t, numbers_text
 
   type :: line_t
     character(:), allocatable :: text
   end type line_t
 
-  !> Lines that are collected one by one.
-  type :: lines_t
+  !> Visitor that collects a line for each key.
+  type, extends(key_visitor_t) :: used_list_t
     type(line_t), allocatable :: list(:)
     integer :: n = 0
+    type(group_key_t) :: about                    !! the present group
+    integer :: k = 0                              !! it is the k-th of its name
+    character(:), allocatable :: label            !! 'run', 'body(1)', 'boundary(top)'
   contains
-    procedure :: add
-    procedure :: add_text
-    procedure :: add_real
-    procedure :: add_reals
-    procedure :: add_integer
-  end type lines_t
+    procedure :: group => begin_group
+    procedure :: take_real => list_real
+    procedure :: take_integer => list_integer
+    procedure :: take_text => list_text
+    procedure :: take_list => list_numbers
+    procedure :: take_vector => list_vector
+    procedure, private :: add
+    procedure :: lines
+  end type used_list_t
 
   character(*), parameter :: equals = ' = '
 
@@ -32,139 +39,50 @@ contains
 
   !> All values as used, defaults included, in the order of the reference; numbers with as many
   !> digits as read back to the same bits, 'none' where there is no value. Bodies carry their
-  !> number, boundaries and pressures their name: body(1).x_min, boundary(top).velocity.
+  !> number, boundaries, pressures and named materials their name: body(1).x_min,
+  !> boundary(top).velocity, material(clay).density.
   function used_values(input) result(values)
     type(input_t), intent(in) :: input
     character(:), allocatable :: values(:)
-    type(lines_t) :: lines
-    integer :: i, longest
+    type(input_t)     :: visited
+    type(used_list_t) :: used
 
-    call add_run(input, lines)
-    do i = 1, size(input%boundaries)
-      call add_boundary(input%boundaries(i), lines)
-    end do
-    do i = 1, size(input%pressures)
-      call add_pressure(input%pressures(i), lines)
-    end do
-    call add_rest(input, lines)
-    longest = 1
-    do i = 1, lines%n
-      longest = max(longest, len(lines%list(i)%text))
-    end do
-    allocate (character(longest) :: values(lines%n))
-    do i = 1, lines%n
-      values(i) = lines%list(i)%text
-    end do
+    visited = input
+    call visited%visit(used)
+    allocate (values, source=used%lines())
   end function used_values
 
-  subroutine add_run(input, lines)
-    type(input_t), intent(in)    :: input
-    type(lines_t), intent(inout) :: lines
-    character(:), allocatable :: body
-    integer :: i
+  !> What has been collected.
+  function lines(self) result(values)
+    class(used_list_t), intent(in) :: self
+    character(:), allocatable :: values(:)
+    integer :: i, longest
 
-    call lines%add_text('run.name', input%run%name)
-    call lines%add_text('run.title', input%run%title)
-    call lines%add_text('run.output_dir', input%run%output_dir)
-    call lines%add_text('run.operators', input%run%operators)
-    associate (d => input%discretisation)
-      call lines%add_real('discretisation.spacing', d%spacing)
-      call lines%add_real('discretisation.horizon', d%horizon)
-      call lines%add_text('discretisation.layout', d%layout)
-      call lines%add_text('discretisation.volumes', d%volumes)
-      call lines%add_text('discretisation.influence', d%influence)
-      call lines%add_text('discretisation.fit', d%fit)
-    end associate
-    do i = 1, size(input%bodies)
-      body = 'body('//integer_text(i)//').'
-      call lines%add_text(body//'shape', input%bodies(i)%shape)
-      call lines%add_real(body//'x_min', input%bodies(i)%x_min)
-      call lines%add_real(body//'x_max', input%bodies(i)%x_max)
-      call lines%add_real(body//'y_min', input%bodies(i)%y_min)
-      call lines%add_real(body//'y_max', input%bodies(i)%y_max)
-      call lines%add_text(body//'file', input%bodies(i)%file)
+    longest = 1
+    do i = 1, self%n
+      longest = max(longest, len(self%list(i)%text))
     end do
-    associate (m => input%material)
-      call lines%add_text('material.model', m%model)
-      call lines%add_text('material.strain_measure', m%strain_measure)
-      call lines%add_real('material.density', m%density)
-      call lines%add_real('material.youngs_modulus', m%youngs_modulus)
-      call lines%add_real('material.poissons_ratio', m%poissons_ratio)
-      call lines%add_real('material.yield_stress', m%yield_stress)
-      call lines%add_real('material.kinematic_modulus', m%kinematic_modulus)
-      call lines%add_real('material.isotropic_modulus', m%isotropic_modulus)
-      call lines%add_real('material.residual_strength', m%residual_strength)
-    end associate
-  end subroutine add_run
+    allocate (character(longest) :: values(self%n))
+    do i = 1, self%n
+      values(i) = self%list(i)%text
+    end do
+  end function lines
 
-  subroutine add_boundary(boundary, lines)
-    type(boundary_input_t), intent(in)    :: boundary
-    type(lines_t),          intent(inout) :: lines
-    character(:), allocatable :: stem
+  !> A group that may stand several times carries its number, until its name is known.
+  subroutine begin_group(self, about)
+    class(used_list_t), intent(inout) :: self
+    type(group_key_t),  intent(in)    :: about
 
-    stem = 'boundary('//boundary%name//').'
-    call lines%add_text(stem//'side', boundary%side)
-    call lines%add_text(stem//'contact', boundary%contact)
-    call lines%add_reals(stem//'velocity', boundary%velocity)
-    call lines%add_reals(stem//'times', boundary%times)
-    call lines%add_reals(stem//'velocities_x', boundary%velocities_x)
-    call lines%add_reals(stem//'velocities_y', boundary%velocities_y)
-    call lines%add_reals(stem//'velocity_gradient', boundary%velocity_gradient)
-    call lines%add_reals(stem//'factors', boundary%factors)
-    call lines%add_reals(stem//'traction', boundary%traction)
-    call lines%add_real(stem//'ramp_time', boundary%ramp_time)
-  end subroutine add_boundary
-
-  subroutine add_pressure(pressure, lines)
-    type(pressure_input_t), intent(in)    :: pressure
-    type(lines_t),          intent(inout) :: lines
-    character(:), allocatable :: stem
-
-    stem = 'pressure('//pressure%name//').'
-    call lines%add_text(stem//'side', pressure%side)
-    call lines%add_reals(stem//'span', pressure%span)
-    call lines%add_real(stem//'value', pressure%value)
-    call lines%add_real(stem//'ramp_time', pressure%ramp_time)
-  end subroutine add_pressure
-
-  subroutine add_rest(input, lines)
-    type(input_t), intent(in)    :: input
-    type(lines_t), intent(inout) :: lines
-
-    call lines%add_text('stabilisation.method', input%stabilisation%method)
-    call lines%add_real('stabilisation.factor', input%stabilisation%factor)
-    associate (t => input%integration)
-      call lines%add_real('integration.end_time', t%end_time)
-      call lines%add_real('integration.final_strain', t%final_strain)
-      call lines%add_text('integration.time_step_rule', t%time_step_rule)
-      call lines%add_real('integration.time_step', t%time_step)
-      call lines%add_real('integration.safety', t%safety)
-      call lines%add_real('integration.damping', t%damping)
-      call lines%add_text('integration.damping_frame', t%damping_frame)
-    end associate
-    associate (p => input%imperfection)
-      call lines%add_real('imperfection.amplitude', p%amplitude)
-      call lines%add_real('imperfection.x', p%x)
-      call lines%add_real('imperfection.y', p%y)
-      call lines%add_real('imperfection.radius', p%radius)
-    end associate
-    associate (f => input%random_field)
-      call lines%add_real('random_field.coefficient_of_variation', f%coefficient_of_variation)
-      call lines%add_real('random_field.correlation_length', f%correlation_length)
-      call lines%add_integer('random_field.seed', f%seed)
-    end associate
-    associate (o => input%output)
-      call lines%add_reals('output.frame_strains', o%frame_strains)
-      call lines%add_reals('output.frame_times', o%frame_times)
-      call lines%add_integer('output.frame_count', o%frame_count)
-      call lines%add_integer('output.history_count', o%history_count)
-      call lines%add_real('output.checkpoint_every', o%checkpoint_every)
-    end associate
-  end subroutine add_rest
+    if (self%about%name /= about%name) self%k = 0
+    self%k = self%k + 1
+    self%about = about
+    self%label = trim(about%name)
+    if (about%repeats) self%label = self%label//'('//integer_text(self%k)//')'
+  end subroutine begin_group
 
   subroutine add(self, key, value)
-    class(lines_t), intent(inout) :: self
-    character(*),   intent(in)    :: key, value
+    class(used_list_t), intent(inout) :: self
+    character(*),       intent(in)    :: key, value
     type(line_t), allocatable :: longer(:)
     integer :: i
 
@@ -177,34 +95,63 @@ contains
       call move_alloc(longer, self%list)
     end if
     self%n = self%n + 1
-    self%list(self%n)%text = key//equals//value
+    self%list(self%n)%text = self%label//'.'//key//equals//value
   end subroutine add
 
-  subroutine add_text(self, key, text)
-    class(lines_t), intent(inout) :: self
-    character(*),   intent(in)    :: key, text
+  !> The name of a group that may stand several times is its label, and no line of its own. A name
+  !> that is the default labels nothing: 'material.density', where there is but one material.
+  subroutine list_text(self, key, text)
+    class(used_list_t),        intent(inout) :: self
+    type(key_t),               intent(in)    :: key
+    character(:), allocatable, intent(inout) :: text
 
-    if (text == '') then
-      call self%add(key, 'none')
+    if (key%name == 'name' .and. self%about%repeats) then
+      self%label = trim(self%about%name)
+      if (text /= key%default) self%label = self%label//'('//text//')'
+    else if (text == '') then
+      call self%add(trim(key%name), 'none')
     else
-      call self%add(key, text)
+      call self%add(trim(key%name), text)
     end if
-  end subroutine add_text
+  end subroutine list_text
 
-  subroutine add_real(self, key, x)
-    class(lines_t), intent(inout) :: self
-    character(*),   intent(in)    :: key
-    real(wp),       intent(in)    :: x
+  subroutine list_real(self, key, x)
+    class(used_list_t), intent(inout) :: self
+    type(key_t),        intent(in)    :: key
+    real(wp),           intent(inout) :: x
 
-    call self%add(key, number_text(x))
-  end subroutine add_real
+    call self%add(trim(key%name), number_text(x))
+  end subroutine list_real
 
-  subroutine add_reals(self, key, x)
-    class(lines_t), intent(inout) :: self
-    character(*),   intent(in)    :: key
-    real(wp),       intent(in)    :: x(:)
+  subroutine list_integer(self, key, i)
+    class(used_list_t), intent(inout) :: self
+    type(key_t),        intent(in)    :: key
+    integer,            intent(inout) :: i
+
+    call self%add(trim(key%name), integer_text(i))
+  end subroutine list_integer
+
+  subroutine list_numbers(self, key, x)
+    class(used_list_t),    intent(inout) :: self
+    type(key_t),           intent(in)    :: key
+    real(wp), allocatable, intent(inout) :: x(:)
+
+    call self%add(trim(key%name), numbers_text(x))
+  end subroutine list_numbers
+
+  subroutine list_vector(self, key, x)
+    class(used_list_t), intent(inout) :: self
+    type(key_t),        intent(in)    :: key
+    real(wp),           intent(inout) :: x(:)
+
+    call self%add(trim(key%name), numbers_text(x))
+  end subroutine list_vector
+
+  !> Numbers with commas between them; 'none' where there are none.
+  pure function numbers_text(x) result(text)
+    real(wp), intent(in) :: x(:)
+    character(:), allocatable :: text, number
     character(26*size(x)) :: buffer
-    character(:), allocatable :: number
     integer :: i, n
 
     n = 0
@@ -214,16 +161,9 @@ contains
       buffer(n + 1:n + len(number)) = number
       n = n + len(number)
     end do
-    call self%add_text(key, buffer(:n))
-  end subroutine add_reals
-
-  subroutine add_integer(self, key, i)
-    class(lines_t), intent(inout) :: self
-    character(*),   intent(in)    :: key
-    integer,        intent(in)    :: i
-
-    call self%add(key, integer_text(i))
-  end subroutine add_integer
+    text = buffer(:n)
+    if (n == 0) text = 'none'
+  end function numbers_text
 
   !> Name every value in which a run that is to go on differs from the run so far.
   !>

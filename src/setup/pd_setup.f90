@@ -80,7 +80,7 @@ contains
     do k = 1, size(model%boundaries)
       model%boundaries(k)%points = model%operators%storage%row(model%boundaries(k)%points)
     end do
-    call mark_free(model%points%position, model%points%volume, input%material%density, &
+    call mark_free(model%points%position, model%points%volume, input%materials(1)%density, &
       model%boundaries, model%points%free)
 
     model%damping = input%integration%damping

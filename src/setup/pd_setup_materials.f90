@@ -40,7 +40,7 @@ contains
     real(wp), allocatable :: strength(:)
 
     allocate (model%materials%list(1))
-    associate (m => input%material, material => model%materials%list(1))
+    associate (m => input%materials(1), material => model%materials%list(1))
       material%name = 'material'
       material%density = m%density
       material%youngs_modulus = m%youngs_modulus
@@ -101,7 +101,7 @@ contains
     real(wp),      intent(out), contiguous :: yield_stress(:)   !! (n) [Pa]
     integer :: i
 
-    associate (mean => max(0.0_wp, input%material%yield_stress), field => input%random_field, &
+    associate (mean => max(0.0_wp, input%materials(1)%yield_stress), field => input%random_field, &
       flaw => input%imperfection)
       yield_stress = mean
       if (is_set(field%coefficient_of_variation)) then
