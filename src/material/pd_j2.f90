@@ -285,16 +285,19 @@ contains
     type(law_points_t), intent(inout) :: points
     type(flow_t), intent(inout) :: flow
     type(yielding_t) :: yielding
-    real(wp) :: trial(n_block, 4), excess(n_block)
+    real(wp) :: trial(n_block, 4), excess(n_block), largest
     integer  :: n, i
 
-    call trial_block(self, first, lo, hi, strain, points, trial, excess)
+    call trial_block(self, [first, lo, hi], strain, points%history, points%strength, trial, &
+      excess, largest)
     n = 0
-    do i = lo, hi
-      if (excess(i - first + 1) <= 0.0_wp) cycle
-      n = n + 1
-      flow%rows(n) = i
-    end do
+    if (.not. largest <= 0.0_wp) then   ! most blocks are elastic, and need no look at each row
+      do i = lo, hi
+        if (excess(i - first + 1) <= 0.0_wp) cycle
+        n = n + 1
+        flow%rows(n) = i
+      end do
+    end if
     flow%n = n
     if (n > 0) then
       call gather_points(n, first, flow%rows, trial, points, yielding)
@@ -357,13 +360,13 @@ contains
   end subroutine scatter_points
 
   !> Trial stress of rows lo to hi, and by how much 3/2 |eta*|^2 exceeds sigma_y^2.
-  pure subroutine trial_block(law, first, lo, hi, strain, points, trial, excess)
+  pure subroutine trial_block(law, rows, strain, history, yield_stress, trial, excess, largest)
     class(j2_t), intent(in) :: law
-    integer,    intent(in) :: first, lo, hi
-    real(wp),   intent(in), contiguous :: strain(:, :)
-    type(law_points_t), intent(in) :: points
+    integer,    intent(in) :: rows(3)              !! first, lo, hi
+    real(wp),   intent(in), contiguous :: strain(:, :), history(:, :), yield_stress(:)
     real(wp),   intent(out) :: trial(n_block, 4)   !! S* xx yy zz xy [Pa]; row 1: row `first`
     real(wp),   intent(out) :: excess(n_block)     !! [Pa^2]
+    real(wp),   intent(out) :: largest             !! excess of any row
     real(wp) :: g2, lambda, hi_modulus, floor_strength, volumetric, exx, eyy, ezz, exy, mean, strength
     real(wp) :: etaxx, etayy, etazz, etaxy
     integer  :: i, b
@@ -373,30 +376,30 @@ contains
     hi_modulus = law%isotropic_modulus
     floor_strength = 0.0_wp
     if (law%isotropic_modulus < 0.0_wp) floor_strength = law%residual_strength
-    associate (history => points%history, yield_stress => points%strength)
-      !$omp simd simdlen(8) private(b, volumetric, exx, eyy, ezz, exy, mean, strength) &
-      !$omp private(etaxx, etayy, etazz, etaxy)
-      do i = lo, hi
-        b = i - first + 1
-        exx = strain(b, 1) - history(i, 1)
-        eyy = strain(b, 2) - history(i, 2)
-        ezz = strain(b, 3) - history(i, 3)
-        exy = strain(b, 4) - history(i, 4)
-        volumetric = exx + eyy + ezz
-        trial(b, 1) = g2 * exx + lambda * volumetric
-        trial(b, 2) = g2 * eyy + lambda * volumetric
-        trial(b, 3) = g2 * ezz + lambda * volumetric
-        trial(b, 4) = g2 * exy
-        mean = volumetric / 3.0_wp
-        etaxx = g2 * (exx - mean) - history(i, 5)
-        etayy = g2 * (eyy - mean) - history(i, 6)
-        etazz = g2 * (ezz - mean) - history(i, 7)
-        etaxy = g2 * exy - history(i, 8)
-        strength = max(min(floor_strength, yield_stress(i)), &
-          yield_stress(i) + hi_modulus * history(i, 9))
-        excess(b) = 1.5_wp * (etaxx**2 + etayy**2 + etazz**2 + 2.0_wp * etaxy**2) - strength**2
-      end do
-    end associate
+    largest = -huge(1.0_wp)
+    !$omp simd simdlen(8) private(b, volumetric, exx, eyy, ezz, exy, mean, strength) &
+    !$omp private(etaxx, etayy, etazz, etaxy) reduction(max:largest)
+    do i = rows(2), rows(3)
+      b = i - rows(1) + 1
+      exx = strain(b, 1) - history(i, 1)
+      eyy = strain(b, 2) - history(i, 2)
+      ezz = strain(b, 3) - history(i, 3)
+      exy = strain(b, 4) - history(i, 4)
+      volumetric = exx + eyy + ezz
+      trial(b, 1) = g2 * exx + lambda * volumetric
+      trial(b, 2) = g2 * eyy + lambda * volumetric
+      trial(b, 3) = g2 * ezz + lambda * volumetric
+      trial(b, 4) = g2 * exy
+      mean = volumetric / 3.0_wp
+      etaxx = g2 * (exx - mean) - history(i, 5)
+      etayy = g2 * (eyy - mean) - history(i, 6)
+      etazz = g2 * (ezz - mean) - history(i, 7)
+      etaxy = g2 * exy - history(i, 8)
+      strength = max(min(floor_strength, yield_stress(i)), &
+        yield_stress(i) + hi_modulus * history(i, 9))
+      excess(b) = 1.5_wp * (etaxx**2 + etayy**2 + etazz**2 + 2.0_wp * etaxy**2) - strength**2
+      largest = max(largest, excess(b))
+    end do
   end subroutine trial_block
 
   !> sigma_y(alpha): isotropic softening ends at the residual strength, hardening has no end. A

@@ -8,7 +8,6 @@
 module pd_verlet
   use pd_kinds, only: block_sum, n_block, wp
   use pd_model, only: frame_t, model_t
-  use pd_points, only: points_t
   use pd_state, only: block_work_t, state_t
   implicit none
   private
@@ -21,8 +20,9 @@ module pd_verlet
     logical :: second = .false., first = .false.
   end type kicks_t
 
-  !> Numbers of a half kick that loops keep in registers.
+  !> The rows of a half kick, and numbers that loops keep in registers.
   type :: kick_t
+    integer  :: lo, hi
     real(wp) :: dt, half, c           !! [s], dt / (2 rho), C
     real(wp) :: lower(2), slope(2)    !! v_ref at the lower end, and from there to the upper [m/s]
   end type kick_t
@@ -70,26 +70,25 @@ contains
     do k = model%materials%first_run(block), model%materials%first_run(block + 1) - 1
       associate (run => model%materials%runs(k), points => model%points, &
         u => state%displacement, v => state%velocity, f => state%force)
-        kick = kick_t(time_step, &
+        kick = kick_t(run%lo, run%hi, time_step, &
           0.5_wp * time_step / model%materials%list(run%material)%density, model%damping, &
           frame%lower, frame%upper - frame%lower)
         if (kicks%second) then
-          call kick_rows(run%lo, run%hi, kick, points, f, v, part)
+          call kick_rows(kick, points%free, points%volume, points%place, f, v, part)
           work(1:2) = work(1:2) + part
         end if
         if (kicks%first) then
-          call kick_and_drift_rows(run%lo, run%hi, kick, points, f, v, u, part)
+          call kick_and_drift_rows(kick, points%free, points%volume, points%place, f, v, u, part)
           work(3:4) = work(3:4) + part
         end if
       end associate
     end do
   end subroutine move_block
 
-  !> First half kick and drift of rows lo to hi.
-  pure subroutine kick_and_drift_rows(lo, hi, kick, points, f, v, u, work)
-    integer,        intent(in)    :: lo, hi
+  !> First half kick and drift of the rows of a kick.
+  pure subroutine kick_and_drift_rows(kick, free, volume, place, f, v, u, work)
     type(kick_t),   intent(in)    :: kick
-    type(points_t), intent(in)    :: points
+    real(wp),       intent(in),    contiguous :: free(:, :), volume(:), place(:)   !! see points_t
     real(wp),       intent(in),    contiguous :: f(:, :)            !! f^n (n,2) [N/m^3]
     real(wp),       intent(inout), contiguous :: v(:, :), u(:, :)   !! v^n -> v^{n+1/2}, u
     real(wp),       intent(out)   :: work(2)                        !! [J/m]
@@ -101,14 +100,13 @@ contains
     lower2 = kick%lower(2)
     slope1 = kick%slope(1)
     slope2 = kick%slope(2)
-    if (hi - lo + 1 < n_block) then   ! sums go over whole blocks
+    if (kick%hi - kick%lo + 1 < n_block) then   ! sums go over whole blocks
       drag_work = 0.0_wp
       frame_work = 0.0_wp
     end if
-    associate (half => kick%half, c => kick%c, dt => kick%dt, free => points%free, &
-      volume => points%volume, place => points%place)
+    associate (lo => kick%lo, half => kick%half, c => kick%c, dt => kick%dt)
       !$omp simd simdlen(8) private(b, ref1, ref2, drag1, drag2)
-      do i = lo, hi
+      do i = lo, kick%hi
         b = i - lo + 1
         ref1 = lower1 + slope1 * place(i)
         ref2 = lower2 + slope2 * place(i)
@@ -126,11 +124,10 @@ contains
     work(2) = 0.5_wp * kick%dt * block_sum(frame_work)
   end subroutine kick_and_drift_rows
 
-  !> Second half kick of rows lo to hi.
-  pure subroutine kick_rows(lo, hi, kick, points, f, v, work)
-    integer,        intent(in)    :: lo, hi
+  !> Second half kick of the rows of a kick.
+  pure subroutine kick_rows(kick, free, volume, place, f, v, work)
     type(kick_t),   intent(in)    :: kick
-    type(points_t), intent(in)    :: points
+    real(wp),       intent(in),    contiguous :: free(:, :), volume(:), place(:)   !! see points_t
     real(wp),       intent(in),    contiguous :: f(:, :)   !! f^{n+1} (n,2) [N/m^3]
     real(wp),       intent(inout), contiguous :: v(:, :)   !! v^{n+1/2} -> v^{n+1} (n,2) [m/s]
     real(wp),       intent(out)   :: work(2)               !! [J/m]
@@ -144,14 +141,13 @@ contains
     lower2 = kick%lower(2)
     slope1 = kick%slope(1)
     slope2 = kick%slope(2)
-    if (hi - lo + 1 < n_block) then   ! sums go over whole blocks
+    if (kick%hi - kick%lo + 1 < n_block) then   ! sums go over whole blocks
       drag_work = 0.0_wp
       frame_work = 0.0_wp
     end if
-    associate (half => kick%half, c => kick%c, free => points%free, volume => points%volume, &
-      place => points%place)
+    associate (lo => kick%lo, half => kick%half, c => kick%c)
       !$omp simd simdlen(8) private(b, ref1, ref2, drag1, drag2, half1, half2)
-      do i = lo, hi
+      do i = lo, kick%hi
         b = i - lo + 1
         ref1 = lower1 + slope1 * place(i)
         ref2 = lower2 + slope2 * place(i)

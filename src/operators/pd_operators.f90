@@ -182,24 +182,31 @@ contains
     integer,  intent(in) :: lo, hi
     real(wp), intent(in),    contiguous :: u(:, :)   !! (n,2) [m]; as taken in
     real(wp), intent(inout), contiguous :: h(:, :)   !! out: (n,4) xx xy yx yy
+
+    call self%gradient_sums_block(lo, hi, u, h)
+    call times_k_inverse(lo, hi, self%k_inverse, h)
+  end subroutine gradient_block
+
+  !> H = G K^-1 of rows lo to hi, in the place of G.
+  pure subroutine times_k_inverse(lo, hi, k, h)
+    integer,  intent(in) :: lo, hi
+    real(wp), intent(in),    contiguous :: k(:, :)   !! K^-1 (n,3) xx yy xy [1/m^4]
+    real(wp), intent(inout), contiguous :: h(:, :)   !! G [m^4] -> H (n,4) xx xy yx yy
     integer  :: i
     real(wp) :: gxx, gxy, gyx, gyy
 
-    call self%gradient_sums_block(lo, hi, u, h)
-    associate (k => self%k_inverse)
-      !$omp simd simdlen(8) private(gxx, gxy, gyx, gyy)
-      do i = lo, hi
-        gxx = h(i, 1)
-        gxy = h(i, 2)
-        gyx = h(i, 3)
-        gyy = h(i, 4)
-        h(i, 1) = gxx * k(i, 1) + gxy * k(i, 3)
-        h(i, 2) = gxx * k(i, 3) + gxy * k(i, 2)
-        h(i, 3) = gyx * k(i, 1) + gyy * k(i, 3)
-        h(i, 4) = gyx * k(i, 3) + gyy * k(i, 2)
-      end do
-    end associate
-  end subroutine gradient_block
+    !$omp simd simdlen(8) private(gxx, gxy, gyx, gyy)
+    do i = lo, hi
+      gxx = h(i, 1)
+      gxy = h(i, 2)
+      gyx = h(i, 3)
+      gyy = h(i, 4)
+      h(i, 1) = gxx * k(i, 1) + gxy * k(i, 3)
+      h(i, 2) = gxx * k(i, 3) + gxy * k(i, 2)
+      h(i, 3) = gyx * k(i, 1) + gyy * k(i, 3)
+      h(i, 4) = gyx * k(i, 3) + gyy * k(i, 2)
+    end do
+  end subroutine times_k_inverse
 
   !> Take the first Piola stress of rows lo to hi, and keep A = P K^-1 - c H.
   !>
@@ -209,22 +216,30 @@ contains
     integer,  intent(in) :: lo, hi
     real(wp), intent(in), contiguous :: h(:, :)   !! H (n,4) xx xy yx yy
     real(wp), intent(in), contiguous :: p(:, :)   !! P xx xy yx yy [Pa]; row 1 is row lo
-    integer :: i, b
 
-    associate (k => self%k_inverse, a => self%force_tensor)
-      !$omp simd simdlen(8) private(b)
-      do i = lo, hi
-        b = i - lo + 1
-        a(i, 1) = p(b, 1) * k(i, 1) + p(b, 2) * k(i, 3)
-        a(i, 2) = p(b, 1) * k(i, 3) + p(b, 2) * k(i, 2)
-        a(i, 3) = p(b, 3) * k(i, 1) + p(b, 4) * k(i, 3)
-        a(i, 4) = p(b, 3) * k(i, 3) + p(b, 4) * k(i, 2)
-      end do
-    end associate
+    call stress_times_k_inverse(lo, hi, self%k_inverse, p, self%force_tensor)
     if (allocated(self%control)) &
       call subtract_affine_control(lo, hi, self%control, h, self%force_tensor)
     call self%weigh_block(lo, hi, self%force_tensor)
   end subroutine hand_over_block
+
+  !> A = P K^-1 of rows lo to hi.
+  pure subroutine stress_times_k_inverse(lo, hi, k, p, a)
+    integer,  intent(in) :: lo, hi
+    real(wp), intent(in),    contiguous :: k(:, :)   !! K^-1 (n,3) xx yy xy [1/m^4]
+    real(wp), intent(in),    contiguous :: p(:, :)   !! P xx xy yx yy [Pa]; row 1 is row lo
+    real(wp), intent(inout), contiguous :: a(:, :)   !! out: A (n,4) xx xy yx yy [N/m^6]
+    integer :: i, b
+
+    !$omp simd simdlen(8) private(b)
+    do i = lo, hi
+      b = i - lo + 1
+      a(i, 1) = p(b, 1) * k(i, 1) + p(b, 2) * k(i, 3)
+      a(i, 2) = p(b, 1) * k(i, 3) + p(b, 2) * k(i, 2)
+      a(i, 3) = p(b, 3) * k(i, 1) + p(b, 4) * k(i, 3)
+      a(i, 4) = p(b, 3) * k(i, 3) + p(b, 4) * k(i, 2)
+    end do
+  end subroutine stress_times_k_inverse
 
   !> A <- A - c H for rows lo to hi.
   pure subroutine subtract_affine_control(lo, hi, c, h, a)
