@@ -2,7 +2,6 @@
 module pd_run
   use, intrinsic :: iso_fortran_env, only: int64
   use omp_lib, only: omp_get_max_threads
-  use pd_boundary, only: boundary_forces
   use pd_checkpoint, only: checkpoint_t
   use pd_clock, only: clock_t
   use pd_command_line, only: options_t
@@ -118,8 +117,7 @@ contains
         state%strength = model%strength
         call ledger%fit(model%blocks)
         call model%operators%take_in(state%displacement)
-        call boundary_forces(model%points%position, model%points%volume, run%clock%time(), &
-          state%force, model%boundaries)
+        call model%supports%take_reactions(model%points%volume, run%clock%time(), state%force)
       else
         call start(model, state)
         ledger = new_ledger(model%blocks)

@@ -12,7 +12,7 @@ module pd_input
   use pd_material_checks, only: check_materials
   use pd_motion_checks, only: check_motion
   use pd_namelist, only: namelist_group_t, read_text_file, scan_namelist
-  use pd_platens, only: platens_of
+  use pd_platen_checks, only: platens_of
   use pd_used_values, only: compare_used, used_values
   implicit none
   private

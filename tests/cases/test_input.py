@@ -249,7 +249,7 @@ def test_json_goes_with_the_reference(perigeo, run_case, tmp_path):
 WRONG_SETTINGS = {
     "spacing=0.1": "--set spacing=0.1: no key with a value; allowed: group.key=value",
     "discretisation.spcing=0.1": "unknown key, did you mean 'spacing'?",
-    "discretsation.spacing=0.1": "unknown group, did you mean 'discretisation'?",
+    "discretization.spacing=0.1": "unknown group, did you mean 'discretisation'?",
     "discretisation.spacing=abc": "--set discretisation.spacing=abc: text where a number is due",
     "material.density=-1": "--set material.density=-1: out of range; found: -1; allowed: > 0",
     "material.clay.density=1": "the file has no such group; found: clay",
