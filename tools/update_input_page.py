@@ -34,7 +34,9 @@ def updated(page: str, reference: str) -> str:
 def main() -> None:
     """Update or check a page."""
     program, path = sys.argv[1], Path(sys.argv[2])
-    done = subprocess.run([program, "--input-reference"], check=True, capture_output=True, text=True)
+    done = subprocess.run(
+        [program, "--input-reference"], check=True, capture_output=True, text=True
+    )
     page = path.read_text(encoding="utf-8")
     new = updated(page, done.stdout)
     if "--check" in sys.argv and new != page:

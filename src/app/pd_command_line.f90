@@ -73,13 +73,7 @@ contains
         call report_unknown(word, errors)
       end select
     end do
-    if (options%json .and. .not. options%input_reference) call errors%add( &
-      '--json goes with --input-reference')
-    if (options%version .or. options%help .or. options%input_reference) return
-    if (options%input_path == '' .and. errors%count() == 0) &
-      call errors%add('no input file is given; perigeo --help shows how')
-    if (options%restart .and. options%force) call errors%add('--restart goes on with the '// &
-      'results of an earlier run, --force overwrites them: use one of them')
+    call check_together(options, errors)
 
   contains
 
@@ -126,6 +120,20 @@ contains
       options%input_path = word
     end if
   end subroutine take_input_path
+
+  !> What options need, and what they exclude.
+  subroutine check_together(options, errors)
+    type(options_t),    intent(in)    :: options
+    type(error_list_t), intent(inout) :: errors
+
+    if (options%json .and. .not. options%input_reference) call errors%add( &
+      '--json goes with --input-reference')
+    if (options%version .or. options%help .or. options%input_reference) return
+    if (options%input_path == '' .and. errors%count() == 0) &
+      call errors%add('no input file is given; perigeo --help shows how')
+    if (options%restart .and. options%force) call errors%add('--restart goes on with the '// &
+      'results of an earlier run, --force overwrites them: use one of them')
+  end subroutine check_together
 
   !> One --set more.
   subroutine add_setting(text, options)
@@ -185,11 +193,12 @@ contains
       '  --restart           go on from the newest checkpoint in the output folder', &
       '  --force             overwrite the results of an earlier run', &
       '  --quiet             no progress on the screen; errors still appear', &
-      '  --set GROUP.KEY=VALUE    a value in place of that of the input file, as often as needed:', &
-      '                      material.density=1800, boundary.top.velocity=0,-0.02, body.2.x_max=1', &
+      '  --set GROUP.KEY=VALUE', &
+      '                      a value in place of that of the input file, as often as needed:', &
+      '                      material.density=1800, boundary.top.velocity=0,-0.02', &
       '  --print-input       print an input file with all values as used; run nothing', &
-      '  --input-reference   print the tables of all input keys (as in doc/input.md); with --json', &
-      '                      for programs', &
+      '  --input-reference   print the tables of all input keys (see doc/input.md); with', &
+      '                      --json for programs', &
       '  --version, --help', &
       '', &
       'Results, in the output folder: <name>_history.csv (curves), <name>.h5 (fields),', &

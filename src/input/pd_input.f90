@@ -7,7 +7,7 @@ module pd_input
   use pd_input_types, only: all_keys, input_t
   use pd_input_values, only: check_groups, count_groups
   use pd_key_list, only: key_list_t
-  use pd_key_reader, only: key_reader_t, new_reader
+  use pd_key_reader, only: key_reader_t
   use pd_load_checks, only: check_loads
   use pd_material_checks, only: check_materials
   use pd_motion_checks, only: check_motion
@@ -90,7 +90,7 @@ contains
     allocate (input%materials(count_groups(groups, 'material')))
     allocate (input%boundaries(count_groups(groups, 'boundary')))
     allocate (input%pressures(count_groups(groups, 'pressure')))
-    reader = new_reader(groups, input%path)
+    call reader%open(groups, input%path)
     call input%visit(reader)
     call input%run%complete()
     call input%output%complete()

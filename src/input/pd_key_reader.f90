@@ -1,7 +1,7 @@
 !> Visitor that fetches the values of a scanned file: as given, else the default, else nothing.
 !>
-!> What is wrong with a value has been complained about by `check_groups`, which marks it as damaged;
-!> a damaged value reads as one that is not given and has no default.
+!> What is wrong with a value has been complained about by `check_groups`, which marks it as
+!> damaged; a damaged value reads as one that is not given and has no default.
 module pd_key_reader
   use pd_input_values, only: group_named
   use pd_keys, only: group_key_t, key_t, key_visitor_t
@@ -11,7 +11,7 @@ module pd_key_reader
   implicit none
   private
 
-  public :: key_reader_t, new_reader
+  public :: key_reader_t
 
   type, extends(key_visitor_t) :: key_reader_t
     private
@@ -19,6 +19,7 @@ module pd_key_reader
     type(namelist_group_t) :: present
     integer :: k = 0                              !! the present group is the k-th of its name
   contains
+    procedure :: open => open_groups
     procedure :: group => begin_group
     procedure :: take_real => read_real
     procedure :: take_integer => read_whole
@@ -29,16 +30,16 @@ module pd_key_reader
 
 contains
 
-  !> A reader of these groups. The groups of one name are to be visited in their order.
-  function new_reader(groups, path) result(reader)
-    type(namelist_group_t), intent(in) :: groups(:)
-    character(*),           intent(in) :: path
-    type(key_reader_t) :: reader
+  !> Read these groups of a file. The groups of one name are to be visited in their order.
+  subroutine open_groups(self, groups, path)
+    class(key_reader_t),    intent(inout) :: self
+    type(namelist_group_t), intent(in)    :: groups(:)
+    character(*),           intent(in)    :: path
 
-    reader%groups = groups
-    reader%present%file = path
-    reader%present%name = ''
-  end function new_reader
+    allocate (self%groups, source=groups)
+    self%present%file = path
+    self%present%name = ''
+  end subroutine open_groups
 
   subroutine begin_group(self, about)
     class(key_reader_t), intent(inout) :: self

@@ -356,14 +356,14 @@ contains
       call scanner%skip_blank()
       start = scanner%at
       start_line = scanner%line
-      if (scanner%next() == '' .or. scanner%next() == '/' .or. scanner%next() == '&') then
-        exit
-      else if (scanner%next() == ',') then
+      if (scanner%next() == '' .or. scanner%next() == '/' .or. scanner%next() == '&') exit
+      if (scanner%next() == ',') then
         if (comma_before) call damage('has an empty value', allowed='a value between commas')
         comma_before = .true.
         scanner%at = scanner%at + 1
         cycle
-      else if (scanner%next() == '=') then
+      end if
+      if (scanner%next() == '=') then
         call damage('has one = too many')
         scanner%at = scanner%at + 1
         cycle

@@ -1,9 +1,11 @@
 """Wrong input: every mistake is named, the exit status is 2, and nothing is written."""
 
+import json
 import subprocess
 import sys
 from pathlib import Path
 
+import h5py
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -112,6 +114,17 @@ MISTAKES = {
         "&integration final_strain: a platen moves under a traction",
     ),
     "ramp without a load": ("-0.01 /", "-0.01, ramp_time = 1 /", "no effect without traction"),
+    "material that is not there": (
+        "y_max = 1.0",
+        "y_max = 1.0, material = 'clay'",
+        "&body material: unknown material; found: 'clay'; allowed: 'material'",
+    ),
+    "materials without names": (
+        "&boundary",
+        "&material model = 'elastic', density = 1.0, youngs_modulus = 1.0, poissons_ratio = 0.3 /\n"
+        "&boundary",
+        "&material name: the key is missing, it is needed where there are several materials",
+    ),
     "cloud that is not there": (
         "x_min = 0.0, x_max = 0.5, y_min = 0.0, y_max = 1.0",
         "shape = 'file', file = 'none.txt'",
@@ -189,9 +202,122 @@ def test_results_of_an_earlier_run_stay_when_the_input_is_wrong(run_case, tmp_pa
     assert everything_in(tmp_path) == before
 
 
-def test_the_tables_of_the_reference_page_are_what_the_program_writes(program):
-    tool = [sys.executable, ROOT / "tools" / "update_input_page.py"]
-    done = subprocess.run(
-        [*tool, program, ROOT / "doc" / "input.md", "--check"], capture_output=True, text=True
-    )
+def test_the_reference_page_holds_the_tables_that_the_program_writes(program):
+    page = ROOT / "doc" / "input.md"
+    update = [sys.executable, ROOT / "tools" / "update_input_page.py", program, page, "--check"]
+    done = subprocess.run(update, check=False, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+
+
+def test_the_example_of_the_reference_page_is_right(run_case, tmp_path):
+    page = (ROOT / "doc" / "input.md").read_text()
+    example = page.split("## A complete example")[1].split("```fortran")[1].split("```")[0]
+    done = run_case(example, tmp_path, "--check")
+    assert done.returncode == 0, done.stderr
+
+
+def test_the_reference_is_there_as_json(perigeo, tmp_path):
+    done = perigeo(["--input-reference", "--json"], tmp_path)
+    assert done.returncode == 0, done.stderr
+    groups = {group["name"]: group for group in json.loads(done.stdout)["groups"]}
+    assert groups["run"]["required"]
+    assert not groups["run"]["repeats"]
+    assert groups["material"]["repeats"]
+    assert groups["material"]["sentence"]
+    keys = {key["name"]: key for key in groups["discretisation"]["keys"]}
+    assert keys["spacing"]["range"] == {
+        "lower": 0.0, "lower_allowed": False, "upper": None, "upper_allowed": True,
+    }  # fmt: skip
+    assert keys["spacing"]["unit"] == "m"
+    assert keys["spacing"]["required"]
+    assert keys["layout"]["choices"] == ["nodes", "cells"]
+    assert keys["layout"]["default"] == "nodes"
+    names = {"name", "type", "count", "unit", "default", "default_means", "range", "choices"}
+    for group in groups.values():
+        for key in group["keys"]:
+            assert set(key) == names | {"required", "sentence", "also"}
+            assert key["sentence"]
+
+
+def test_json_goes_with_the_reference(perigeo, run_case, tmp_path):
+    done = run_case(VALID, tmp_path, "--json")
+    assert done.returncode == 1
+    assert "--json goes with --input-reference" in done.stderr
+
+
+# --set, the part of the message
+WRONG_SETTINGS = {
+    "spacing=0.1": "--set spacing=0.1: no key with a value; allowed: group.key=value",
+    "discretisation.spcing=0.1": "unknown key, did you mean 'spacing'?",
+    "discretization.spacing=0.1": "unknown group, did you mean 'discretisation'?",
+    "discretisation.spacing=abc": "--set discretisation.spacing=abc: text where a number is due",
+    "material.density=-1": "--set material.density=-1: out of range; found: -1; allowed: > 0",
+    "material.clay.density=1": "the file has no such group; found: clay",
+    "boundary.velocity=0,1": "the file has several groups of this name; found: 2 groups",
+    "boundary.top.velocity=1": "--set boundary.top.velocity=1: too few values",
+    "material.density=1 /": "the value cannot be read; found: 1 /",
+    "body.material=clay": "--set body.material=clay: unknown material; found: 'clay'",
+}
+
+
+@pytest.mark.parametrize("setting", WRONG_SETTINGS)
+def test_a_wrong_setting_is_named(run_case, tmp_path, setting):
+    done = run_case(VALID, tmp_path, "--set", setting)
+    assert_refused(done, tmp_path, WRONG_SETTINGS[setting])
+
+
+def test_a_setting_without_a_value_is_a_wrong_command_line(run_case, tmp_path):
+    done = run_case(VALID, tmp_path, "--set", "--check")
+    assert done.returncode == 1
+    assert "a value is missing" in done.stderr
+
+
+SETTINGS = ["run.title=it's soil", "boundary.top.velocity=0,-0.02", "body.1.x_max=1.0"]
+SETTINGS += ["stabilisation.method=silling", "stabilisation.factor=0.5", "material.density=1800"]
+
+
+def test_what_is_printed_says_what_was_set_and_reads_back(run_case, tmp_path):
+    options = [word for setting in SETTINGS for word in ("--set", setting)]
+    done = run_case(VALID, tmp_path, *options, "--print-input")
+    assert done.returncode == 0, done.stderr
+    for line in ("title = 'it''s soil'", "velocity = 0.0, -0.02", "x_max = 1.0", "factor = 0.5"):
+        assert f"\n  {line}\n" in done.stdout
+    again = run_case(done.stdout, tmp_path, "--print-input")
+    assert again.returncode == 0, again.stderr
+    assert again.stdout == done.stdout
+    assert [path.name for path in tmp_path.iterdir()] == ["run.nml"]
+
+
+@pytest.mark.parametrize("path", sorted((ROOT / "input").glob("*.nml")), ids=lambda path: path.stem)
+def test_inputs_printed_read_back(perigeo, tmp_path, path):
+    for cloud in path.parent.glob("*.txt"):
+        (tmp_path / cloud.name).write_bytes(cloud.read_bytes())
+    printed = perigeo(["--print-input", path], tmp_path)
+    assert printed.returncode == 0, printed.stderr
+    (tmp_path / "run.nml").write_text(printed.stdout)
+    again = perigeo(["--print-input", "run.nml"], tmp_path)
+    assert again.stdout == printed.stdout, again.stderr
+
+
+def test_a_run_with_settings_stores_them_beside_the_file(run_case, tmp_path):
+    done = run_case(VALID, tmp_path, "--set", "material.density=1800", "--quiet")
+    assert done.returncode == 0, done.stderr
+    with h5py.File(tmp_path / "results" / "case" / "case.h5") as results:
+        assert results["input/namelist"][()] == VALID.encode()
+        values = [line.strip() for line in results["input/values"].asstr()[()]]
+        assert "material.density = 1800.0" in values
+        assert b"--set material.density=1800" in bytes(results.attrs["command_line"])
+
+
+def test_a_restart_asks_for_the_same_settings(run_case, tmp_path):
+    case = VALID.replace("&output", "&output checkpoint_every = 1.0e-6,")
+    settings = ["--set", "material.density=1800"]
+    done = run_case(case, tmp_path, *settings, "--quiet")
+    assert done.returncode == 0, done.stderr
+    done = run_case(case, tmp_path, "--restart", "--quiet")
+    assert done.returncode == 2
+    assert "material.density: differs from the run that is to go on" in done.stderr
+    assert "found: 2000.0; allowed: 1800.0" in done.stderr
+    later = [*settings, "--set", "integration.final_strain=0.0011"]
+    done = run_case(case, tmp_path, *later, "--restart", "--quiet")
     assert done.returncode == 0, done.stderr
