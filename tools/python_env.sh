@@ -1,6 +1,6 @@
 # Put perigeo-post and what it needs into .venv:  sh tools/python_env.sh run|test|lint
 #
-#   run   the package itself          test   also what the tests need
+#   run   the package with studies and report     test   also what the tests need
 #   lint  also the linters
 #
 # Says nothing when everything is there already, and then needs no network. Leaves with 1, after a
@@ -10,9 +10,9 @@ venv=.venv
 stamp=$venv/.perigeo-$level
 
 case $level in
-  run) packages="-e ./postproc" ;;
-  test) packages="-e ./postproc[test]" ;;
-  lint) packages="-e ./postproc[test,lint]" ;;
+  run) packages="-e ./postproc[study,report]" ;;
+  test) packages="-e ./postproc[study,report,test]" ;;
+  lint) packages="-e ./postproc[study,report,test,lint]" ;;
   *) echo "tools/python_env.sh: '$level': it must be run, test or lint" >&2; exit 1 ;;
 esac
 

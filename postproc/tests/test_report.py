@@ -480,7 +480,7 @@ def test_files_outside_the_study_are_refused(results: Path) -> None:
 def test_a_broken_verification_does_not_stop_the_report(results: Path) -> None:
     (results / "verify" / "verify.json").write_text('[{"quantity": "a"}]')
     report = write_report(results)
-    assert "'rows[0].exact' is missing" in report.unreadable[0]
+    assert "'[0].exact' is missing" in report.unreadable[0]
     assert "Verification" not in Reader(report.path).text
 
 

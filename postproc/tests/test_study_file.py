@@ -75,7 +75,9 @@ def test_every_combination_of_parameters_is_a_run(load: Any) -> None:
     assert study.runs[3].parameters == {"delta": 0.25, "m": 1}
     assert study.runs[3].label == "delta = 0.25, m = 1"
     assert study.series == (("trial", "Trial"),)
-    assert list(study.columns)[5:] == ["delta", "m", "points", "steps", "width"]
+    assert list(study.columns)[5:] == [
+        "delta", "m", "points", "steps", "width", "reasons",
+    ]  # fmt: skip
 
 
 def test_expressions_set_values_of_the_namelist(load: Any) -> None:

@@ -24,7 +24,7 @@ from perigeo_post.study.file import Kinds
 from perigeo_post.study.jobs import only_one
 from perigeo_post.study.measures import MEASURES
 from perigeo_post.study.options import OPTIONS
-from perigeo_post.study.types import Column, Drawing, Measure
+from perigeo_post.study.types import Column, Drawing, Measure, Missing
 
 BASE = SPECIMEN.replace("output_dir = 'out'", "title = 'a specimen'")
 STUDY = """\
@@ -326,6 +326,32 @@ def test_a_measure_or_figure_that_breaks_does_not_cost_the_others(do):
     assert [figure["name"] for figure in report()["figures"]] == ["peaks"]
     assert "figure b cannot be drawn: ZeroDivisionError: nothing there" in " ".join(words.split())
     assert "other cannot be measured" in words
+
+
+def test_a_value_that_is_missing_has_its_reason_wherever_it_is_shown(do, tmp_path):
+    def far(run, state):
+        return {"slope": Missing(f"{run.path} ends too early"), "size": 1.0, "void": Missing("?")}
+
+    columns = {name: Column("1", name) for name in ("slope", "size", "void", "forgotten")}
+    text = STUDY.replace('["peak"]', '["peak", "far"]')
+    kinds = dataclasses.replace(KINDS, measures={**KINDS.measures, "far": Measure(columns, far)})
+    status, words = do(text, kinds, output=tmp_path / "elsewhere")
+    assert status == 0, words
+    first = report(tmp_path / "elsewhere")["runs"][0]
+    assert first["row"]["slope"] is None
+    assert first["reasons"] == {
+        "slope": "e_40.h5 ends too early", "void": "?", "forgotten": "far does not give it",
+    }  # fmt: skip
+    row = rows(tmp_path / "elsewhere")[0]
+    assert (row["slope"], row["size"]) == ("", "1")
+    assert row["reasons"] == (
+        "slope: e_40.h5 ends too early; void: ?; forgotten: far does not give it"
+    )
+    assert "  no value\n    slope: e_40: e_40.h5 ends too early\n" in words
+    assert "    void: e_40, e_50, e_60: ?\n" in words
+    page = tmp_path / "report.html"
+    main(["report", "--results", str(tmp_path), "-o", str(page)])
+    assert "e_40.h5 ends too early" in page.read_text()
 
 
 def test_a_program_that_is_killed_counts_as_failed_and_is_tried_again(do, program, tmp_path):

@@ -186,6 +186,9 @@ class StudySection:
             described.update({line.name: line.description for line in values.lines})
         if not parts:
             return None
+        if self.study.reasons():
+            parts.append(el("details", el("summary", "Why values are missing"),
+                            facts_list(self.study.reasons())))  # fmt: skip
         items = [(name, text) for name, text in described.items() if text]
         if items:
             parts.append(el("details", el("summary", "What the quantities mean"),

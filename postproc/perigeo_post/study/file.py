@@ -13,7 +13,7 @@ from typing import Any
 
 from .expressions import nearest
 from .findings import Finding, read_finding
-from .level import COUNTED, FIXED, Level, read_level
+from .level import COUNTED, FIXED, LAST, Level, read_level
 from .namelist import Namelist, NamelistError, parse_namelist
 from .options import check_options
 from .plan import PlannedRun, Planner, has_frame
@@ -168,6 +168,7 @@ def _columns(
             if name in parameters or name in FIXED:
                 top.complain("measures", f"'{measure}' gives a column '{name}', which is there")
             columns.setdefault(name, column)
+    columns.update(LAST)
     return columns
 
 

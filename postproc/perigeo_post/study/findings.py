@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from ..measure.export import plain
 from .expressions import (
     TABLE_FUNCTIONS,
     Expression,
@@ -18,10 +19,10 @@ from .expressions import (
     nearest,
 )
 from .plan import PlannedRun
+from .record import AGREES, DIFFERS, IN_PART, NO_RESULT, FindingRecord, Verdict
 from .toml import Key, Table
 from .types import Column, Value
 
-AGREES, IN_PART, DIFFERS, NO_RESULT = "agrees", "agrees in part", "differs", "no result"
 _KEYS = ("title", "paper", "found", "values", "holds", "note")
 _FILTERS = ("series", "run", "label")
 
@@ -192,7 +193,7 @@ def _same(one: Any, other: Any) -> bool:
 # ---- evaluation ------------------------------------------------------------------------------
 
 
-def evaluate(finding: Finding, rows: Sequence[TableRow]) -> dict[str, Any]:
+def evaluate(finding: Finding, rows: Sequence[TableRow]) -> FindingRecord:
     """The finding as it stands in study.json."""
     functions = {**TABLE_FUNCTIONS, **_table_functions(rows)}
     values: dict[str, Any] = {}
@@ -209,9 +210,9 @@ def evaluate(finding: Finding, rows: Sequence[TableRow]) -> dict[str, Any]:
         if missing:
             break
         values[name] = of(expression)
-    tests: list[list[Any]] = []
+    tests: list[tuple[str, bool | None]] = []
     if not missing:
-        tests = [[one.text, _truth(of(one))] for one in finding.holds]
+        tests = [(one.text, _truth(of(one))) for one in finding.holds]
     found = ""
     if not missing:
         try:
@@ -220,18 +221,18 @@ def evaluate(finding: Finding, rows: Sequence[TableRow]) -> dict[str, Any]:
             missing.append(f"the text cannot be filled in: {error}")
     if missing:
         found = f"no result: {missing[0]}"
-    return {
-        "title": finding.title,
-        "paper": finding.paper,
-        "found": found,
-        "verdict": NO_RESULT if missing else verdict([bool(truth) for _, truth in tests]),
-        "note": finding.note,
-        "values": {name: _listed(value) for name, value in values.items()},
-        "holds": tests,
-    }
+    return FindingRecord(
+        title=finding.title,
+        paper=finding.paper,
+        found=found,
+        verdict=NO_RESULT if missing else verdict([bool(truth) for _, truth in tests]),
+        note=finding.note,
+        values=plain({name: _listed(value) for name, value in values.items()}),
+        holds=tests,
+    )
 
 
-def verdict(tests: Sequence[bool]) -> str:
+def verdict(tests: Sequence[bool]) -> Verdict:
     """In one word or three."""
     if all(tests):
         return AGREES

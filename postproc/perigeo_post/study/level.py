@@ -23,8 +23,9 @@ COUNTED = {
     "points": Column("1", "points of the model, fictitious ones included"),
     "steps": Column("1", "time steps of the run"),
 }
+LAST = {"reasons": Column("", "what has no value in this row, and why")}
 OF_THE_STUDY = ("run.name", "run.output_dir")  # what `set` may not touch
-_RESERVED = (*FIXED, *COUNTED, "case", "pi", "and", "or", "not", "if", "else", "in", "is")
+_RESERVED = (*FIXED, *COUNTED, *LAST, "case", "pi", "and", "or", "not", "if", "else", "in", "is")
 
 Edit = tuple[Key, str, Any]  # place in the study file, key of the namelist, value
 

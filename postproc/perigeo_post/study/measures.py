@@ -1,12 +1,13 @@
 """The measures that a study can ask for: groups of columns of its table of runs.
 
-Each group takes one run at one state. Nothing is raised for what a run cannot tell: the value is
-None then. doc/results.md defines the quantities.
+Each group takes one run at one state. Nothing is raised for what a run cannot tell: in place of the
+value stands why there is none. doc/results.md defines the quantities.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from typing import Union
 
 import numpy as np
 
@@ -23,41 +24,50 @@ from ..measure.quality import (
     reaction_gap,
 )
 from ..measure.softening import softening_branch, strain_rate
-from ..read.errors import PostError
+from ..read.errors import FieldNotFoundError, PostError, RequestError
+from ..read.points import FloatArray
 from ..read.run import Frame, Run
-from .types import Column, Measure, State, Value
+from .types import Column, Measure, Missing, State, Value
 
 STRAINS = {"0_5": 0.005, "1_0": 0.010, "1_5": 0.015}  # at which the stress is listed
 
-Values = dict[str, Value]
+Values = dict[str, Union[Value, Missing]]
+Part = Callable[[Run, State], Values]
 
 
-def _tried(what: Callable[[], Mapping[str, Value] | None]) -> Values:
-    """What could be measured; nothing where the result does not hold it."""
-    try:
-        return dict(what() or {})
-    except (PostError, ValueError, ArithmeticError, np.linalg.LinAlgError):
-        return {}
+def _measure(columns: Mapping[str, Column], parts: Mapping[Part, str]) -> Measure:
+    """A group whose columns are filled by several parts, each of which may fail by itself.
 
-
-def _measure(columns: Mapping[str, Column], *parts: Callable[[Run, State], Values]) -> Measure:
-    """A group whose columns are filled by several parts, each of which may fail by itself."""
+    parts: what gives values, and the names of the columns that it fills.
+    """
 
     def take(run: Run, state: State) -> Values:
         found: Values = {}
-        for part in parts:
-            found.update(_tried(lambda part=part: part(run, state)))  # type: ignore[misc]
-        return {name: _plain(found.get(name)) for name in columns}
+        for part, names in parts.items():
+            try:
+                values = part(run, state)
+            except (PostError, ValueError, ArithmeticError, np.linalg.LinAlgError) as error:
+                reason = str(error) if isinstance(error, PostError) else type(error).__name__
+                found.update(dict.fromkeys(names.split(), Missing(reason)))
+            else:
+                found.update({name: _plain(values[name]) for name in names.split()})
+        return {name: found[name] for name in columns}
 
     return Measure(columns, take)
 
 
-def _plain(value: Value) -> Value:
-    """Python's own numbers, None for what is not finite."""
-    if value is None or isinstance(value, (bool, str, int)):
+def _plain(value: Value | Missing) -> Value | Missing:
+    """Python's own numbers, a reason for what is not finite."""
+    if isinstance(value, (bool, str, int, Missing)):
         return value
-    number = float(value)
-    return number if np.isfinite(number) else None
+    number = float("nan") if value is None else float(value)
+    return number if np.isfinite(number) else Missing("it has no finite value in this run")
+
+
+def _or(value: Value, reason: str) -> Value | Missing:
+    """A value; the reason where it is none or not finite."""
+    found = _plain(value)
+    return Missing(reason) if isinstance(found, Missing) else found
 
 
 def frame_of(run: Run, state: State) -> Frame:
@@ -81,10 +91,14 @@ _CURVE = {
 def _curve(run: Run, state: State) -> Values:
     curve = stress_strain(run)
     stress, strain = peak(curve)
-    found: Values = {"peak_stress": stress, "strain_at_peak": strain}
-    if len(curve.x):
-        found.update(last_strain=float(curve.x[-1]), last_stress=float(curve.y[-1]))
-    return found
+    last = (float(curve.x[-1]), float(curve.y[-1])) if len(curve.x) else (None, None)
+    none = "the history has no row with a stress"
+    return {
+        "peak_stress": _or(stress, none),
+        "strain_at_peak": _or(strain, none),
+        "last_strain": _or(last[0], none),
+        "last_stress": _or(last[1], none),
+    }
 
 
 def _curve_at_state(run: Run, state: State) -> Values:
@@ -118,15 +132,18 @@ _MODULUS = {
 }
 
 
-def _modulus_parts() -> list[Callable[[Run, State], Values]]:
-    return [
-        lambda run, _: {"modulus_platen": apparent_modulus(run).value},
-        lambda run, _: {"modulus_gauge": gauge_modulus(run).value},
-        lambda run, _: {"modulus_gauge_rows": gauge_modulus(run, thick=False).value},
-        lambda run, _: {"modulus_mean": mean_modulus(run).value},
-        lambda run, _: {"modulus_mean_corrected": mean_modulus(run, True).value},
-        lambda run, _: {"modulus_target": run.number("material.youngs_modulus")},
-    ]
+_MODULUS_PARTS: dict[Part, str] = {
+    lambda run, _: {"modulus_platen": apparent_modulus(run).value}: "modulus_platen",
+    lambda run, _: {"modulus_gauge": gauge_modulus(run).value}: "modulus_gauge",
+    lambda run, _: {
+        "modulus_gauge_rows": gauge_modulus(run, thick=False).value
+    }: "modulus_gauge_rows",
+    lambda run, _: {"modulus_mean": mean_modulus(run).value}: "modulus_mean",
+    lambda run, _: {
+        "modulus_mean_corrected": mean_modulus(run, True).value
+    }: "modulus_mean_corrected",
+    lambda run, _: {"modulus_target": run.number("material.youngs_modulus")}: "modulus_target",
+}
 
 
 # ---- band ----------------------------------------------------------------------------------
@@ -199,11 +216,12 @@ def _band(run: Run, state: State) -> Values:
 
 def _pattern(run: Run, state: State) -> Values:
     found = pattern_of(frame_of(run, state))
+    nothing = "there is no earlier frame, or no band in what has grown since"
     return {
-        "band_ratio": found.ratio,
-        "band_ratio_growing": found.ratio_growing,
+        "band_ratio": _or(found.ratio, f"the pattern is {found.name}"),
+        "band_ratio_growing": _or(found.ratio_growing, nothing),
         "pattern": found.name,
-        "pattern_growing": found.growing,
+        "pattern_growing": _or(found.growing, nothing),
     }
 
 
@@ -277,21 +295,26 @@ _SOFTENING = {
 
 def _branch(run: Run, state: State) -> Values:
     found = softening_branch(run)
+    early = "the run ends before the stress has fallen that far"
     return {
-        "strain_at_90": found.strain_upper,
-        "strain_at_50": found.strain_lower,
-        "softening_slope": found.slope,
-        "softening_displacement": found.displacement,
+        "strain_at_90": _or(found.strain_upper, early),
+        "strain_at_50": _or(found.strain_lower, early),
+        "softening_slope": _or(found.slope, early),
+        "softening_displacement": _or(found.displacement, early),
     }
 
 
 def _brittleness(run: Run, state: State) -> Values:
-    return {"brittleness": softening_branch(run).slope / apparent_modulus(run).slope}
+    slope = softening_branch(run).slope / apparent_modulus(run).slope
+    return {"brittleness": _or(slope, "the run ends before the stress has fallen to 50 %")}
 
 
 def _stresses(run: Run, state: State) -> Values:
     curve = stress_strain(run)
-    return {f"stress_{name}": curve.at(strain) for name, strain in STRAINS.items()}
+    return {
+        f"stress_{name}": _or(curve.at(strain), "the run does not reach this strain")
+        for name, strain in STRAINS.items()
+    }
 
 
 def _stress_ratio(run: Run, state: State) -> Values:
@@ -322,8 +345,16 @@ _FIELD = {
 }
 
 
+def _strength(run: Run) -> FloatArray:
+    """Initial yield stress of the points of the body."""
+    try:
+        return run.last_frame["yield_stress"][run.body]
+    except FieldNotFoundError:
+        raise RequestError("the result holds no field of the yield stress") from None
+
+
 def _field(run: Run, state: State) -> Values:
-    values = run.last_frame["yield_stress"][run.body]
+    values = _strength(run)
     volumes = run.volumes[run.body]
     mean = float(np.average(values, weights=volumes))
     spread = float(np.sqrt(np.average((values - mean) ** 2, weights=volumes)))
@@ -335,7 +366,7 @@ def _field(run: Run, state: State) -> Values:
 
 
 def _field_in_band(run: Run, state: State) -> Values:
-    values = run.last_frame["yield_stress"][run.body]
+    values = _strength(run)
     alpha = frame_of(run, state)["plastic_strain"][run.body]
     inside = alpha > 0.5 * measure_band(run, number=frame_of(run, state).number).width.peak
     return {
@@ -346,12 +377,50 @@ def _field_in_band(run: Run, state: State) -> Values:
 
 
 MEASURES: dict[str, Measure] = {
-    "curve": _measure(_CURVE, _curve, _curve_at_state, _frame_numbers),
-    "modulus": _measure(_MODULUS, *_modulus_parts()),
-    "band": _measure(_BAND, _band, _pattern),
-    "quality": _measure(_QUALITY, _kinetic, _bound, _gap, _balance, _zero_energy),
-    "softening": _measure(
-        _SOFTENING, _branch, _brittleness, _stresses, _stress_ratio, _dissipation, _rate
+    "curve": _measure(
+        _CURVE,
+        {
+            _curve: "peak_stress strain_at_peak last_strain last_stress",
+            _curve_at_state: "stress_at_state",
+            _frame_numbers: "state_strain largest_alpha",
+        },
     ),
-    "field": _measure(_FIELD, _field, _field_in_band),
+    "modulus": _measure(_MODULUS, _MODULUS_PARTS),
+    "band": _measure(
+        _BAND,
+        {
+            _band: "width width_uncertainty width_closed width_over_horizon "
+            "width_over_horizon_uncertainty width_over_spacing width_median width_spread "
+            "peak_alpha angle angle_uncertainty direction profile_mirrored",
+            _pattern: "band_ratio band_ratio_growing pattern pattern_growing",
+        },
+    ),
+    "quality": _measure(
+        _QUALITY,
+        {
+            _kinetic: "kinetic_ratio kinetic_ratio_largest",
+            _bound: "kinetic_bound_peak kinetic_bound_largest",
+            _gap: "reaction_gap reaction_gap_peak reaction_gap_largest",
+            _balance: "energy_error_largest",
+            _zero_energy: "zero_energy_largest",
+        },
+    ),
+    "softening": _measure(
+        _SOFTENING,
+        {
+            _branch: "strain_at_90 strain_at_50 softening_slope softening_displacement",
+            _brittleness: "brittleness",
+            _stresses: " ".join(f"stress_{name}" for name in STRAINS),
+            _stress_ratio: "stress_ratio",
+            _dissipation: "dissipated_energy dissipated_density",
+            _rate: "strain_rate approach_velocity",
+        },
+    ),
+    "field": _measure(
+        _FIELD,
+        {
+            _field: "yield_stress_mean yield_stress_variation yield_stress_least",
+            _field_in_band: "yield_stress_band",
+        },
+    ),
 }
