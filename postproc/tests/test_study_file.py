@@ -10,7 +10,7 @@ import pytest
 
 from perigeo_post.draw.style import new_figure
 from perigeo_post.study.file import Kinds, Study, load_study
-from perigeo_post.study.options import OPTIONS
+from perigeo_post.study.tables import OPTIONS
 from perigeo_post.study.toml import StudyError, key_lines
 from perigeo_post.study.types import Column, Drawing, Measure
 
@@ -246,7 +246,7 @@ FINDING = '[[finding]]\ntitle = "F"\nfound = "{a}"\n'
         (SWEPT + "[[figure]]\n" + FIGURE + "only = { n = 1 }\n",
          "line 14, figure 1, only, n: unknown key"),
         (SWEPT + "[[figure]]\n" + FIGURE + "x_range = [1]\n",
-         "line 14, figure 1, x_range: the option cannot be this; found: [1]; allowed: [low, high]"),
+         "line 14, figure 1, x_range: must be [low, high]; found: [1]"),
         (SWEPT + "[[figure]]\n" + FIGURE + "strain = [0.004, 0.02]\n",
          "strain: none of its runs has a frame at this strain; found: 0.02; allowed: 0.004, 0.01"),
         (SWEPT + "[[figure]]\n" + FIGURE + "series = ['a']\n",

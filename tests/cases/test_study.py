@@ -23,7 +23,7 @@ from perigeo_post.study.figures import FIGURE_OPTIONS
 from perigeo_post.study.file import Kinds
 from perigeo_post.study.jobs import only_one
 from perigeo_post.study.measures import MEASURES
-from perigeo_post.study.options import OPTIONS
+from perigeo_post.study.tables import OPTIONS
 from perigeo_post.study.types import Column, Drawing, Measure, Missing
 
 BASE = SPECIMEN.replace("output_dir = 'out'", "title = 'a specimen'")
