@@ -6,8 +6,9 @@ module pd_summary
   use pd_input_types, only: input_t, material_input_t, random_field_input_t
   use pd_kinds, only: is_set, wp
   use pd_random_field, only: spread_of, spread_t
-  use pd_schedule, only: schedule_t
   use pd_model, only: model_t
+  use pd_schedule, only: schedule_t
+  use pd_state, only: state_t
   implicit none
   private
 
@@ -56,11 +57,11 @@ contains
       call summary%add('title', input%run%title)
       call summary%add('body', number(body%upper(1) - body%lower(1))//' m x '// &
         number(body%upper(2) - body%lower(2))//' m')
-      call summary%add('points', whole(size(body%points))//', of which fictitious '// &
+      call summary%add('points', whole(body%n)//', of which fictitious '// &
         whole(count(body%boundary > 0)))
       call model%operators%fewest_bonds(fewest, point)
       call summary%add('bonds', number(bonds)//'; per point '// &
-        number(bonds / real(size(body%points), wp))// &
+        number(bonds / real(body%n, wp))// &
         ' on average, '//whole(fewest)//' at least')
       call summary%add('horizon', number(model%delta)//' m, spacing '// &
         number(model%spacing)//' m: m = '//number(model%delta / model%spacing))
@@ -96,7 +97,7 @@ contains
     integer :: weaker
 
     if (.not. is_set(field%coefficient_of_variation)) return
-    associate (strength => model%strength, &
+    associate (strength => model%strength(model%operators%storage%row), &
       inside => model%body%boundary == 0)
       spread = spread_of(strength, model%body%volume, inside)
       weaker = 0
@@ -133,7 +134,7 @@ contains
     do k = 1, size(input%pressures)
       associate (given => input%pressures(k), pressure => model%pressures(k))
         on = ' m of the body'
-        if (any(model%body%boundary(pressure%points) > 0)) on = on//' and layers that continue it'
+        if (any(model%points%in_body(pressure%points) < 0.5_wp)) on = on//' and layers that continue it'
         call summary%add('pressure', given%name//': '//number(given%value)//' Pa on '// &
           given%side//', '//number(pressure%length)//on//', '// &
           whole(size(pressure%points))//' points: '//number(abs(sum(pressure%force)))// &
@@ -153,12 +154,14 @@ contains
 
   end subroutine add_loads
 
-  !> Memory of a run [bytes]: bonds, fields of the state (23 numbers a point), what is fixed (10),
+  !> Memory of a run [bytes]: bonds; per point the fields of the state, what is fixed (10 numbers),
   !> work space (4), a field of a frame on its way to the disk (5).
-  pure real(wp) function memory(model)
+  real(wp) function memory(model)
     type(model_t), intent(in) :: model
+    type(state_t) :: state
 
-    memory = model%operators%memory() + real(model%body%n, wp) * 8.0_wp * (23 + 10 + 4 + 5)
+    memory = model%operators%memory() &
+      + real(model%operators%n, wp) * 8.0_wp * real(state%numbers_per_point() + 10 + 4 + 5, wp)
   end function memory
 
   !> Wall clock time of the run [s], from the fastest of a few applications of the linear operator
@@ -173,8 +176,8 @@ contains
     integer(int64) :: start, finish, rate
     integer :: k
 
-    allocate (h(model%body%n, 4), f(model%body%n, 2), source=0.0_wp)
-    allocate (u(model%body%n, 2), source=0.0_wp)
+    allocate (h(model%operators%n, 4), f(model%operators%n, 2), source=0.0_wp)
+    allocate (u(model%operators%n, 2), source=0.0_wp)
     seconds = huge(1.0_wp)
     do k = 1, repetitions
       call system_clock(start, rate)

@@ -1,11 +1,9 @@
-!> Problems as values, the exit statuses, and the only stop of the program.
+!> Problems as values, exit statuses, and how a run comes out.
 module pd_errors
-  use, intrinsic :: iso_fortran_env, only: error_unit
-  use pd_system, only: exit_program
   implicit none
   private
 
-  public :: error_list_t, stop_if_any
+  public :: error_list_t, outcome_t
   public :: exit_ok, exit_command_line, exit_input, exit_model, exit_calculation, exit_file
   public :: exit_interrupted, exit_terminated
 
@@ -32,6 +30,16 @@ module pd_errors
     procedure :: message
     procedure :: print => print_messages
   end type error_list_t
+
+  !> Whether the program goes on, and if not, why and with which exit status it ends.
+  type :: outcome_t
+    logical :: done = .false.
+    integer :: status = exit_ok
+    type(error_list_t) :: errors
+  contains
+    procedure :: end_if_any
+    procedure :: end_with
+  end type outcome_t
 
 contains
 
@@ -75,7 +83,7 @@ contains
     text = self%messages(i)%text
   end function message
 
-  !> One line a problem on a unit: 'perigeo: error: ...', or with another label.
+  !> Print one problem per line: 'perigeo: error: ...', or with another label.
   subroutine print_messages(self, unit, label)
     class(error_list_t), intent(in)           :: self
     integer,             intent(in)           :: unit
@@ -90,14 +98,24 @@ contains
     end do
   end subroutine print_messages
 
-  !> Where there are problems: print all of them on standard error and leave with `status`.
-  subroutine stop_if_any(errors, status)
-    type(error_list_t), intent(in) :: errors
-    integer,            intent(in) :: status
+  !> End with a status where there are problems, unless the end has come already.
+  subroutine end_if_any(self, errors, status)
+    class(outcome_t),   intent(inout) :: self
+    type(error_list_t), intent(in)    :: errors
+    integer,            intent(in)    :: status
 
-    if (errors%count() == 0) return
-    call errors%print(error_unit)
-    call exit_program(status)
-  end subroutine stop_if_any
+    if (self%done .or. errors%count() == 0) return
+    self%errors = errors
+    call self%end_with(status)
+  end subroutine end_if_any
+
+  !> End with a status.
+  subroutine end_with(self, status)
+    class(outcome_t), intent(inout) :: self
+    integer,          intent(in)    :: status
+
+    self%done = .true.
+    self%status = status
+  end subroutine end_with
 
 end module pd_errors

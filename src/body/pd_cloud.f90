@@ -57,8 +57,6 @@ contains
         body%n = i
         allocate (body%position(i, 2), body%volume(i), source=0.0_wp)
         allocate (body%boundary(i), source=0)
-        allocate (body%points(i))
-        body%points = [(status, status=1, i)]
         status = iostat_end
       end if
     end do

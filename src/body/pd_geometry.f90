@@ -4,7 +4,7 @@
 !> Source: doc/theory.md, sections 1 and 7.
 module pd_geometry
   use pd_errors, only: error_list_t
-  use pd_kinds, only: n_line, wp
+  use pd_kinds, only: wp
   implicit none
   private
 
@@ -22,13 +22,11 @@ module pd_geometry
 
   !> Reference points in the order of the rows of the lattice (y slow, x fast), or of the file.
   type :: body_t
-    integer :: n = 0                            !! points, fictitious ones and voids included
+    integer :: n = 0                            !! points, fictitious ones included
     real(wp), allocatable :: position(:, :)     !! X (n,2) [m]
     real(wp), allocatable :: volume(:)          !! V (n) per unit thickness [m^2]
-    integer,  allocatable :: boundary(:)        !! 0: body, k: fictitious point of boundary k (n),
-                                                !! -1: void: a place of a lattice without a point
-    integer,  allocatable :: points(:)          !! the places that hold a point, ascending
-    integer :: stride = 0                       !! places from a row of a lattice to the next, 0:
+    integer,  allocatable :: boundary(:)        !! 0: body, k: fictitious point of boundary k (n)
+    integer,  allocatable :: place(:, :)        !! column and row on the lattice (n,2); not allocated:
                                                 !! no lattice
     real(wp) :: lower(2) = 0.0_wp               !! corners of the extent of the body without
     real(wp) :: upper(2) = 0.0_wp               !! fictitious points, as used [m]
@@ -41,7 +39,6 @@ module pd_geometry
     logical  :: cells                           !! points at cell centres, else on the boundary
     logical  :: tributary                       !! each point owns its own part of the area
     integer  :: rows                            !! thickness of fictitious layers in points
-    logical  :: with_voids = .false.            !! number the empty places of the box as well
   end type lattice_t
 
   !> Fictitious points beyond one side.
@@ -53,12 +50,12 @@ module pd_geometry
   !> Occupied places of a lattice in a box of columns and rows; index 0 is the lower left place
   !> of the body.
   type :: places_t
-    integer, allocatable :: owner(:, :)         !! void, or as body_t%boundary
+    integer, allocatable :: owner(:, :)         !! `empty`, or as body_t%boundary
     logical, allocatable :: filled(:, :)        !! the square up and right of a node is material
     integer, allocatable :: number(:, :)        !! of the point at a place, 0: none
   end type places_t
 
-  integer, parameter :: void = -1
+  integer, parameter :: empty = -1
 
 contains
 
@@ -118,7 +115,7 @@ contains
     integer :: margin, a(2), b(2), k
 
     margin = lattice%rows + 1
-    allocate (places%owner(-margin:counts(1) + margin, -margin:counts(2) + margin), source=void)
+    allocate (places%owner(-margin:counts(1) + margin, -margin:counts(2) + margin), source=empty)
     allocate (places%filled(-margin:counts(1) + margin, -margin:counts(2) + margin), &
       source=.false.)
     do k = 1, size(first, 2)
@@ -210,55 +207,38 @@ contains
 
   end subroutine fill_layer
 
-  !> Number the places row by row and give them positions and volumes: the occupied ones, or with
-  !> voids all of the box and a margin, so that a shift by a horizon never leaves the fields.
+  !> Number the occupied places row by row, and give them positions and volumes.
   subroutine number_points(places, origin, lattice, body)
     type(places_t),  intent(inout) :: places
     real(wp),        intent(in)    :: origin(2)
     type(lattice_t), intent(in)    :: lattice
     type(body_t),    intent(inout) :: body
-    integer  :: ix, iy, i, k, margin, quarters, low(2), high(2)
+    integer  :: ix, iy, k, quarters, low(2), high(2)
     real(wp) :: offset
 
     call occupied_box(places, low, high)
-    body%n = count(places%owner /= void)
-    allocate (body%points(body%n))
-    if (lattice%with_voids) then
-      margin = whole_lines(lattice%rows)
-      body%stride = whole_lines(high(1) - low(1) + 1 + lattice%rows)
-      body%n = body%stride * (high(2) - low(2) + 1 + 2 * lattice%rows) + 2 * margin
-    end if
+    body%n = count(places%owner /= empty)
     allocate (body%position(body%n, 2), body%volume(body%n), source=0.0_wp)
-    allocate (body%boundary(body%n), source=void)
+    allocate (body%boundary(body%n), body%place(body%n, 2), source=0)
     allocate (places%number, mold=places%owner)
     places%number = 0
     offset = merge(0.5_wp, 0.0_wp, lattice%cells)
     k = 0
     do iy = low(2), high(2)
       do ix = low(1), high(1)
-        if (places%owner(ix, iy) == void) cycle
+        if (places%owner(ix, iy) == empty) cycle
         k = k + 1
-        i = k
-        if (lattice%with_voids) i = margin + 1 + ix - low(1) &
-          + body%stride * (iy - low(2) + lattice%rows)
-        body%points(k) = i
-        places%number(ix, iy) = i
-        body%position(i, :) = origin + (real([ix, iy], wp) + offset) * lattice%spacing
-        body%boundary(i) = places%owner(ix, iy)
+        places%number(ix, iy) = k
+        body%place(k, :) = [ix, iy]
+        body%position(k, :) = origin + (real([ix, iy], wp) + offset) * lattice%spacing
+        body%boundary(k) = places%owner(ix, iy)
         quarters = 4
         if (lattice%tributary .and. .not. lattice%cells) &
           quarters = count(places%filled(ix - 1:ix, iy - 1:iy))
-        body%volume(i) = 0.25_wp * real(quarters, wp) * lattice%spacing**2
+        body%volume(k) = 0.25_wp * real(quarters, wp) * lattice%spacing**2
       end do
     end do
   end subroutine number_points
-
-  !> Places in as many whole lines of the cache as hold a number of them.
-  pure integer function whole_lines(count) result(places)
-    integer, intent(in) :: count
-
-    places = n_line * ((count + n_line - 1) / n_line)
-  end function whole_lines
 
   !> Index of a side in `body_t%sides`, 0 where there is none of that name.
   pure integer function side_number(side) result(k)
@@ -345,9 +325,9 @@ contains
     integer,        intent(in) :: axis, line
 
     if (axis == 1) then
-      holds_points = any(places%owner(line, :) /= void)
+      holds_points = any(places%owner(line, :) /= empty)
     else
-      holds_points = any(places%owner(:, line) /= void)
+      holds_points = any(places%owner(:, line) /= empty)
     end if
   end function holds_points
 

@@ -176,10 +176,9 @@ contains
     real(wp),         intent(in)    :: volume(:)        !! V (n) [m^2]
     real(wp),         intent(in)    :: density          !! rho [kg/m^3]
     type(boundary_t), intent(inout) :: boundaries(:)
-    real(wp),         intent(out)   :: free(:, :)       !! (n,2)
+    real(wp),         intent(inout) :: free(:, :)       !! (n,2); in: 1 where there is a point
     integer :: b, k, p
 
-    free = 1.0_wp
     do b = 1, size(boundaries)
       associate (boundary => boundaries(b))
         boundary%mode_mass = 0.0_wp

@@ -138,7 +138,7 @@ contains
     integer,      intent(in) :: count
     integer, allocatable, intent(out) :: at(:, :)     !! (count, points of the side)
     integer, allocatable :: line(:)
-    integer :: i, j, k, p
+    integer :: i, j, k
 
     allocate (at(count, size(side%points)), source=0)
     associate (x => body%position, first => side%points(1), last => side%points(size(side%points)))
@@ -146,8 +146,7 @@ contains
       do k = 1, size(side%points)
         line(nint((x(side%points(k), 3 - axis) - x(first, 3 - axis)) / abs(step))) = k
       end do
-      do p = 1, size(body%points)
-        i = body%points(p)
+      do i = 1, body%n
         j = nint((x(i, axis) - x(first, axis)) / step) + 1
         k = nint((x(i, 3 - axis) - x(first, 3 - axis)) / abs(step))
         if (j < 1 .or. j > count .or. k < 0 .or. k > ubound(line, 1)) cycle

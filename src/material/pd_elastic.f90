@@ -3,7 +3,8 @@
 !> Source: doc/theory.md, section 3.
 module pd_elastic
   use pd_kinds, only: n_block, wp
-  use pd_law, only: flow_t, law_points_t, law_t, remembered_t
+  use pd_labels, only: label_t
+  use pd_law, only: flow_t, law_points_t, law_t
   implicit none
   private
 
@@ -35,7 +36,7 @@ contains
 
   !> Nothing.
   pure function remembers() result(columns)
-    type(remembered_t), allocatable :: columns(:)
+    type(label_t), allocatable :: columns(:)
 
     allocate (columns(0))
   end function remembers

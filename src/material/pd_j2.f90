@@ -6,7 +6,8 @@
 module pd_j2
   use pd_elastic, only: elastic_t, new_elastic
   use pd_kinds, only: n_block, wp
-  use pd_law, only: flow_t, law_points_t, law_t, remembered_t
+  use pd_labels, only: label_t
+  use pd_law, only: flow_t, law_points_t, law_t
   use pd_tensors, only: inner, norm
   implicit none
   private
@@ -58,18 +59,18 @@ contains
 
   !> What a point remembers.
   pure function remembers() result(columns)
-    type(remembered_t), allocatable :: columns(:)
+    type(label_t), allocatable :: columns(:)
     character(2), parameter :: ends(4) = ['xx', 'yy', 'zz', 'xy']
     integer :: c
 
     allocate (columns(alpha))
     do c = 1, 4
-      columns(plastic_strain + c) = remembered_t('plastic_strain_'//ends(c), '1', &
+      columns(plastic_strain + c) = label_t('plastic_strain_'//ends(c), '1', &
         'plastic strain '//ends(c))
-      columns(back_stress + c) = remembered_t('back_stress_'//ends(c), 'Pa', &
+      columns(back_stress + c) = label_t('back_stress_'//ends(c), 'Pa', &
         'back stress '//ends(c))
     end do
-    columns(alpha) = remembered_t('equivalent_plastic_strain', '1', &
+    columns(alpha) = label_t('equivalent_plastic_strain', '1', &
       'equivalent plastic strain, accumulated')
   end function remembers
 

@@ -6,17 +6,11 @@
 !> Source: doc/theory.md, section 3.
 module pd_law
   use pd_kinds, only: n_block, wp
+  use pd_labels, only: label_t
   implicit none
   private
 
-  public :: law_t, flow_t, law_points_t, remembered_t
-
-  !> One number that a point remembers.
-  type :: remembered_t
-    character(32)  :: name = ''
-    character(8)   :: unit = ''
-    character(120) :: sentence = ''
-  end type remembered_t
+  public :: law_t, flow_t, law_points_t
 
   !> Fields that laws read and write.
   type :: law_points_t
@@ -45,8 +39,8 @@ module pd_law
   abstract interface
     !> The columns of the history, all 0 at first.
     pure function remembers_of() result(columns)
-      import :: remembered_t
-      type(remembered_t), allocatable :: columns(:)
+      import :: label_t
+      type(label_t), allocatable :: columns(:)
     end function remembers_of
     !> Stress of rows lo to hi; the history goes from step n to n+1.
     pure subroutine stress_of(self, first, lo, hi, strain, points, flow)

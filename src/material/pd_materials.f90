@@ -8,6 +8,7 @@ module pd_materials
   use pd_blocks, only: blocks_t
   use pd_elastic, only: isotropic_stress_block
   use pd_kinds, only: n_block, wp
+  use pd_labels, only: label_t
   use pd_law, only: flow_t, law_points_t, law_t
   use pd_measure, only: measure_t, small_strain_block
   use pd_tensors, only: determinant
@@ -36,7 +37,7 @@ module pd_materials
     type(run_t),      allocatable :: runs(:)
     integer,          allocatable :: first_run(:)   !! of each block, and one past the last (blocks+1)
   contains
-    procedure :: columns
+    procedure :: remembered
     procedure :: stress_block
     procedure :: linear_stress_block
     procedure :: strain_block
@@ -80,16 +81,24 @@ contains
     end do
   end subroutine divide_into_runs
 
-  !> Columns that the history needs: most of any law.
-  pure integer function columns(self)
+  !> Columns of the history: those of the law that remembers most. Where laws differ, a column of
+  !> another law has another meaning, and the name of both.
+  pure function remembered(self) result(columns)
     class(materials_t), intent(in) :: self
-    integer :: k
+    type(label_t), allocatable :: columns(:), more(:)
+    integer :: c, k
 
-    columns = 0
-    do k = 1, size(self%list)
-      columns = max(columns, size(self%list(k)%law%remembers()))
+    columns = self%list(1)%law%remembers()
+    do k = 2, size(self%list)
+      more = self%list(k)%law%remembers()
+      do c = 1, min(size(columns), size(more))
+        if (columns(c)%name == more(c)%name) cycle
+        columns(c) = label_t(trim(columns(c)%name)//'_or_'//trim(more(c)%name), '1', &
+          trim(columns(c)%description)//', or '//trim(more(c)%description))
+      end do
+      if (size(more) > size(columns)) columns = [columns, more(size(columns) + 1:)]
     end do
-  end function columns
+  end function remembered
 
   !> From H to the first Piola stress of a block: strain, law, and the stress conjugate to it. The
   !> history goes from step n to n+1.
@@ -101,9 +110,9 @@ contains
     real(wp), intent(in), contiguous :: volume(:)   !! V (n) [m^2]
     real(wp), intent(in), contiguous :: h(:, :)     !! H (n,4) xx xy yx yy
     type(law_points_t), intent(inout) :: points
-    real(wp), intent(inout) :: p(n_block, 4)        !! out: P xx xy yx yy [Pa]
+    real(wp), intent(inout) :: p(n_block, 4)        !! out: P xx xy yx yy [Pa]; first the strain,
+                                                    !! which spares room in the cache
     real(wp), intent(out)   :: dissipated
-    real(wp)     :: strain(n_block, 4)
     type(flow_t) :: flow
     integer      :: first, i, k
 
@@ -111,8 +120,8 @@ contains
     first = self%runs(self%first_run(block))%lo
     do k = self%first_run(block), self%first_run(block + 1) - 1
       associate (run => self%runs(k), material => self%list(self%runs(k)%material))
-        call material%measure%strain_block(first, run%lo, run%hi, h, strain)
-        call material%law%stress_block(first, run%lo, run%hi, strain, points, flow)
+        call material%measure%strain_block(first, run%lo, run%hi, h, p)
+        call material%law%stress_block(first, run%lo, run%hi, p, points, flow)
         do i = 1, flow%n
           dissipated = dissipated + volume(flow%rows(i)) * flow%dissipated(i)
         end do

@@ -58,7 +58,7 @@ contains
     type(frame_t) :: frame
     integer :: k
 
-    call state%allocate(size(model%points%volume), model%materials%columns())
+    call state%allocate(size(model%points%volume), model%materials%remembered())
     state%strength = model%strength
     frame = damping_frame(model, 0.0_wp)
     do k = 1, 2

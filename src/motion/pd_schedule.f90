@@ -8,7 +8,7 @@ module pd_schedule
   implicit none
   private
 
-  public :: schedule_t, new_schedule, row_due, step_at
+  public :: schedule_t, new_schedule, row_due, rows_due, step_at
 
   type :: schedule_t
     real(wp) :: end_time = 0.0_wp            !! asked for [s]
@@ -67,5 +67,17 @@ contains
       floor(real(step, wp) * schedule%rows_per_step + round_off) &
       > floor(real(step - 1, wp) * schedule%rows_per_step + round_off)
   end function row_due
+
+  !> How many rows of the history are due after a step that is done.
+  pure integer function rows_due(schedule, done) result(rows)
+    type(schedule_t), intent(in) :: schedule
+    integer,          intent(in) :: done
+    integer :: step
+
+    rows = 0
+    do step = done + 1, schedule%steps
+      if (row_due(schedule, step)) rows = rows + 1
+    end do
+  end function rows_due
 
 end module pd_schedule

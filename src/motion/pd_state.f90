@@ -1,7 +1,12 @@
 !> The state of a run: everything that changes from step to step at the points.
+!>
+!> `visit` is the table of its fields: whatever is done with all of them is a visitor.
 module pd_state
   use pd_blocks, only: blocks_t
+  use pd_fields, only: allocating_t, counting_t, field_visitor_t, gathering_t, scattering_t, &
+    state_field_t
   use pd_kinds, only: wp
+  use pd_labels, only: label_t
   use pd_law, only: law_points_t
   implicit none
   private
@@ -15,10 +20,13 @@ module pd_state
     real(wp), allocatable :: velocity(:, :)                !! v (n,2) [m/s]
     real(wp), allocatable :: force(:, :)                   !! force density f (n,2) [N/m^3]
     real(wp), allocatable :: displacement_gradient(:, :)   !! H = F - I (n,4) xx xy yx yy
+    type(label_t), allocatable :: remembered(:)            !! columns of the history
   contains
+    procedure :: visit
     procedure :: allocate => allocate_state
-    procedure :: gathered
-    procedure :: scattered
+    procedure :: gather
+    procedure :: scatter
+    procedure :: numbers_per_point
   end type state_t
 
   !> What the blocks of points hand back in a step. Added up in the order of the blocks, it has the
@@ -48,47 +56,67 @@ contains
     allocate (self%failed(blocks%count), source=0)
   end subroutine fit
 
-  !> The unloaded state of n rows, whose points remember `columns` numbers.
-  subroutine allocate_state(self, n, columns)
-    class(state_t), intent(out) :: self
-    integer,        intent(in)  :: n, columns
+  !> Show all fields to a visitor.
+  subroutine visit(self, visitor)
+    class(state_t),         intent(inout) :: self
+    class(field_visitor_t), intent(inout) :: visitor
+    character(*), parameter :: tensor = 'xx yy zz xy'
 
-    allocate (self%displacement(n, 2), self%velocity(n, 2), self%force(n, 2), source=0.0_wp)
-    allocate (self%displacement_gradient(n, 4), self%stress(n, 4), source=0.0_wp)
-    allocate (self%history(n, columns), self%strength(n), source=0.0_wp)
+    call visitor%field(state_field_t('displacement', 'm', 'displacement u', 'x y', &
+      by_neighbours=.true.), self%displacement)
+    call visitor%field(state_field_t('velocity', 'm/s', 'velocity v', 'x y'), self%velocity)
+    call visitor%field(state_field_t('force', 'N/m^3', 'force density f, loads and control '// &
+      'included', 'x y'), self%force)
+    call visitor%field(state_field_t('displacement_gradient', '1', 'H = F - I', 'xx xy yx yy'), &
+      self%displacement_gradient)
+    call visitor%field(state_field_t('stress', 'Pa', 'stress conjugate to the strain', tensor), &
+      self%stress)
+    call visitor%field(state_field_t('strength', 'Pa', 'initial strength', '', &
+      kept=.false.), self%strength)
+    call visitor%field(state_field_t('history', '', 'what the laws remember', '', &
+      columns=self%remembered), self%history)
+  end subroutine visit
+
+  !> The unloaded state of n rows.
+  subroutine allocate_state(self, n, remembered)
+    class(state_t), intent(inout) :: self
+    integer,        intent(in)    :: n
+    type(label_t),  intent(in)    :: remembered(:)   !! columns of the history
+    type(allocating_t) :: room
+
+    self%remembered = remembered
+    room%n = n
+    call self%visit(room)
   end subroutine allocate_state
 
-  !> The state of some rows only, in their order.
-  function gathered(self, rows) result(state)
-    class(state_t), intent(in) :: self
-    integer,        intent(in) :: rows(:)
-    type(state_t) :: state
-    integer :: n
+  !> Reduce the fields that a restart needs to some rows, in their order, and give up the others.
+  subroutine gather(self, places)
+    class(state_t), intent(inout) :: self
+    integer,        intent(in)    :: places(:)
+    type(gathering_t) :: choice
 
-    n = size(rows)
-    allocate (state%displacement(n, 2), source=self%displacement(rows, :))
-    allocate (state%velocity(n, 2), source=self%velocity(rows, :))
-    allocate (state%force(n, 2), source=self%force(rows, :))
-    allocate (state%displacement_gradient(n, 4), source=self%displacement_gradient(rows, :))
-    allocate (state%stress(n, 4), source=self%stress(rows, :))
-    allocate (state%history(n, size(self%history, 2)), source=self%history(rows, :))
-    allocate (state%strength(n), source=self%strength(rows))
-  end function gathered
+    allocate (choice%places, source=places)
+    call self%visit(choice)
+  end subroutine gather
 
   !> The state of n rows from that of some of them; the others are unloaded and at rest.
-  function scattered(self, rows, n) result(state)
-    class(state_t), intent(in) :: self
-    integer,        intent(in) :: rows(:), n
-    type(state_t) :: state
+  subroutine scatter(self, places, n)
+    class(state_t), intent(inout) :: self
+    integer,        intent(in)    :: places(:), n
+    type(scattering_t) :: spread_out
 
-    call state%allocate(n, size(self%history, 2))
-    state%displacement(rows, :) = self%displacement
-    state%velocity(rows, :) = self%velocity
-    state%force(rows, :) = self%force
-    state%displacement_gradient(rows, :) = self%displacement_gradient
-    state%stress(rows, :) = self%stress
-    state%history(rows, :) = self%history
-    state%strength(rows) = self%strength
-  end function scattered
+    allocate (spread_out%places, source=places)
+    spread_out%n = n
+    call self%visit(spread_out)
+  end subroutine scatter
+
+  !> Numbers per point in all fields.
+  integer function numbers_per_point(self) result(numbers)
+    class(state_t), intent(inout) :: self   !! visited, not changed
+    type(counting_t) :: count
+
+    call self%visit(count)
+    numbers = count%numbers
+  end function numbers_per_point
 
 end module pd_state

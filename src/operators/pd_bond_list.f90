@@ -10,6 +10,7 @@ module pd_bond_list
   use pd_families, only: family, horizon_t, influence
   use pd_kinds, only: i8, n_block, wp
   use pd_operators, only: operators_t
+  use pd_storage, only: listed_storage
   implicit none
   private
 
@@ -50,6 +51,7 @@ contains
 
     n = size(position, 1)
     operators%n = n
+    operators%storage = listed_storage(n)
     operators%domain = new_domain(1, n)
     allocate (operators%position(n, 2), source=position)
     call sort_into_cells(position, horizon%delta, cells)
@@ -292,17 +294,17 @@ contains
   end function bonds
 
   !> Fewest bonds of any point, and the first point that has so few.
-  pure subroutine fewest_bonds(self, fewest, row)
+  pure subroutine fewest_bonds(self, fewest, point)
     class(bond_list_t), intent(in)  :: self
-    integer,            intent(out) :: fewest, row
+    integer,            intent(out) :: fewest, point
     integer :: i
 
     fewest = huge(1)
-    row = 0
+    point = 0
     do i = 1, self%n
       if (self%first(i + 1) - self%first(i) >= int(fewest, i8)) cycle
       fewest = int(self%first(i + 1) - self%first(i))
-      row = i
+      point = i
     end do
   end subroutine fewest_bonds
 

@@ -19,6 +19,7 @@ module pd_lattice
   use pd_families, only: horizon_t, influence, within_horizon
   use pd_kinds, only: i8, n_block, n_line, wp
   use pd_operators, only: operators_t
+  use pd_storage, only: lattice_storage
   implicit none
   private
 
@@ -52,16 +53,17 @@ module pd_lattice
 contains
 
   !> Offsets, weights and moments.
-  subroutine new_lattice_operators(horizon, spacing, stride, volume, operators)
+  subroutine new_lattice_operators(horizon, spacing, place, volume, operators)
     type(horizon_t), intent(in) :: horizon
-    real(wp),        intent(in) :: spacing     !! dx [m]
-    integer,         intent(in) :: stride      !! places from a row to the next
-    real(wp),        intent(in) :: volume(:)   !! V (n) [m^2]; voids: 0
+    real(wp),        intent(in) :: spacing       !! dx [m]
+    integer,         intent(in) :: place(:, :)   !! column and row of every point (n,2)
+    real(wp),        intent(in) :: volume(:)     !! V of every point (n) [m^2]
     type(lattice_operators_t), intent(out) :: operators
     integer  :: k, reach, kx, ky, i
     real(wp) :: xi(2), length_squared
 
-    operators%n = size(volume)
+    operators%storage = lattice_storage(horizon, spacing, place)
+    operators%n = operators%storage%rows
     reach = int(horizon%delta / spacing * (1.0_wp + 1.0e-5_wp)) + 1
     allocate (operators%shift((2 * reach + 1)**2), source=0)
     allocate (operators%xi(size(operators%shift), 2), operators%weight(size(operators%shift)), &
@@ -74,7 +76,7 @@ contains
         length_squared = xi(1)**2 + xi(2)**2
         if (.not. within_horizon(horizon, length_squared)) cycle
         k = k + 1
-        operators%shift(k) = kx + ky * stride
+        operators%shift(k) = kx + ky * operators%storage%stride
         operators%xi(k, :) = xi
         operators%weight(k) = influence(horizon, length_squared) * spacing**2
       end do
@@ -83,16 +85,16 @@ contains
     operators%shift = operators%shift(:k)
     operators%xi = operators%xi(:k, :)
     operators%weight = operators%weight(:k)
-    operators%columns = columns_of(horizon, spacing, stride, reach)
+    operators%columns = columns_of(horizon, spacing, operators%storage%stride, reach)
     operators%own_weight = influence(horizon, 0.0_wp) * spacing**2
 
     allocate (operators%share_of(operators%n))
-    operators%share_of = volume / spacing**2
+    operators%share_of = operators%storage%spread(volume) / spacing**2
     operators%weighs = any(abs(operators%share_of) > 0.0_wp .and. &
       abs(operators%share_of - 1.0_wp) > 1.0e-12_wp)
     if (.not. operators%weighs) operators%share_of = anint(operators%share_of)
-    operators%domain = new_domain(line_start(findloc(volume > 0.0_wp, .true., dim=1)), &
-      findloc(volume > 0.0_wp, .true., dim=1, back=.true.))
+    operators%domain = new_domain(line_start(operators%storage%row(1)), &
+      operators%storage%row(operators%storage%n))
     call weigh(operators)
     if (operators%weighs) then
       allocate (operators%weighed_moment(operators%n, 2), source=0.0_wp)
@@ -410,13 +412,13 @@ contains
     bonds = self%n_bonds
   end function bonds
 
-  !> Fewest bonds of any point, and the place of the first point that has so few.
-  pure subroutine fewest_bonds(self, fewest, row)
+  !> Fewest bonds of any point, and the first point that has so few.
+  pure subroutine fewest_bonds(self, fewest, point)
     class(lattice_operators_t), intent(in)  :: self
-    integer,                    intent(out) :: fewest, row
+    integer,                    intent(out) :: fewest, point
 
     fewest = self%fewest
-    row = self%poorest
+    point = self%storage%point_at(self%poorest)
   end subroutine fewest_bonds
 
   !> Memory that the operators take [bytes].

@@ -24,6 +24,7 @@ module pd_operators
   use pd_blocks, only: blocks_t
   use pd_domain, only: domain_t
   use pd_kinds, only: block_sum, i8, n_block, pi, wp
+  use pd_storage, only: storage_t
   implicit none
   private
 
@@ -32,7 +33,8 @@ module pd_operators
   !> Operators of one body. Fields have n rows, some of which may hold no point.
   type, abstract :: operators_t
     integer :: n = 0                                      !! rows of the fields
-    type(domain_t) :: domain                              !! blocks of rows
+    type(storage_t) :: storage                            !! row of every point
+    type(domain_t)  :: domain                             !! blocks of rows
     real(wp), allocatable :: weight_sum(:)                !! W_i = sum_j omega V_j (n) [m^2]
     real(wp), allocatable :: k_inverse(:, :)              !! K^-1 (n,3) xx yy xy [1/m^4]
     real(wp), allocatable :: control(:)                   !! c (n) [N/m^6]; not allocated: none
@@ -106,11 +108,11 @@ module pd_operators
       import :: operators_t, i8
       class(operators_t), intent(in) :: self
     end function bonds_of
-    !> Fewest bonds of any point, and the first row whose point has so few.
-    pure subroutine fewest_of(self, fewest, row)
+    !> Fewest bonds of any point, and the first point that has so few.
+    pure subroutine fewest_of(self, fewest, point)
       import :: operators_t
       class(operators_t), intent(in) :: self
-      integer, intent(out) :: fewest, row
+      integer, intent(out) :: fewest, point
     end subroutine fewest_of
     !> Memory that the realisation takes beside the fields of this type [bytes].
     pure real(wp) function memory_of(self)

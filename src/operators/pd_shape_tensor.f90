@@ -44,7 +44,7 @@ contains
       else
         n_singular = n_singular + 1
         if (n_singular > most_reported) cycle
-        write (text, '(a,i0,a,g0.7,a,g0.7,a)') 'point ', count(volume(:i) > 0.0_wp), ' at (', &
+        write (text, '(a,i0,a,g0.7,a,g0.7,a)') 'point ', operators%storage%point_at(i), ' at (', &
           position(i, 1), ', ', position(i, 2), ') m'
         call errors%add('the shape tensor is singular: the family is too small or lies on '// &
           'one line', trim(text), allowed='condition number below 1e6; a larger horizon helps')

@@ -8,6 +8,7 @@ module pd_checkpoint
   use, intrinsic :: iso_fortran_env, only: int8, int32
   use pd_clock, only: clock_t
   use pd_errors, only: error_list_t
+  use pd_fields, only: field_visitor_t, state_field_t
   use pd_files, only: file_exists, patch_file, replace_file, sync_file
   use pd_hdf5, only: close_file, create_file, create_group, hdf5_file_t, open_file, &
     read_attribute, read_dataset, write_attribute, write_dataset
@@ -32,6 +33,23 @@ module pd_checkpoint
     real(wp),     allocatable :: volume(:)          !! (n) [m^2]
     integer,      allocatable :: boundary(:)        !! (n)
   end type checkpoint_t
+
+  !> Write the fields of a state into an open file, and read them.
+  type, extends(field_visitor_t) :: writing_t
+    type(hdf5_file_t)  :: file
+    type(error_list_t) :: errors
+  contains
+    procedure :: one_number => write_1
+    procedure :: several_numbers => write_2
+  end type writing_t
+
+  type, extends(field_visitor_t) :: reading_t
+    type(hdf5_file_t)  :: file
+    type(error_list_t) :: errors
+  contains
+    procedure :: one_number => read_1
+    procedure :: several_numbers => read_2
+  end type reading_t
 
   integer, parameter :: head_length = 512
   integer, parameter :: schema_version = 1
@@ -66,19 +84,22 @@ contains
   subroutine write_checkpoint(stem, checkpoint, state, errors)
     character(*),       intent(in)    :: stem   !! output folder and name of the run
     type(checkpoint_t), intent(in)    :: checkpoint
-    type(state_t),      intent(in)    :: state
+    class(state_t),     intent(inout) :: state   !! visited, not changed
     type(error_list_t), intent(inout) :: errors
     character(:), allocatable :: temporary
-    type(hdf5_file_t) :: file
+    type(writing_t) :: writer
     integer :: before
     logical :: ignored
 
     before = errors%count()
     temporary = newest(stem)//'.tmp'
-    call create_file(file, temporary, head_length, errors)
-    call write_numbers(file, checkpoint, errors)
-    call write_state(file, state, errors)
-    call close_file(file, errors)
+    call create_file(writer%file, temporary, head_length, errors)
+    call write_numbers(writer%file, checkpoint, errors)
+    call create_group(writer%file, '/state', errors)
+    writer%errors = errors
+    call state%visit(writer)
+    errors = writer%errors
+    call close_file(writer%file, errors)
     if (errors%count() == before) call patch_file(temporary, head(temporary), errors)
     if (errors%count() == before) call sync_file(temporary, errors)
     if (errors%count() == before) then
@@ -102,7 +123,7 @@ contains
   subroutine read_checkpoint(stem, checkpoint, state, warning, errors)
     character(*),              intent(in)    :: stem
     type(checkpoint_t),        intent(out)   :: checkpoint
-    type(state_t),             intent(out)   :: state
+    class(state_t),            intent(inout) :: state   !! fields that are not kept stay
     character(:), allocatable, intent(out)   :: warning
     type(error_list_t),        intent(inout) :: errors
 
@@ -141,40 +162,95 @@ contains
     call write_dataset(file, '/boundary', checkpoint%boundary, errors)
   end subroutine write_numbers
 
-  subroutine write_state(file, state, errors)
-    type(hdf5_file_t),  intent(inout) :: file
-    type(state_t),      intent(in)    :: state
-    type(error_list_t), intent(inout) :: errors
+  subroutine write_1(self, about, values)
+    class(writing_t),      intent(inout) :: self
+    type(state_field_t),   intent(in)    :: about
+    real(wp), allocatable, intent(inout) :: values(:)
 
-    call create_group(file, '/state', errors)
-    call write_dataset(file, '/state/displacement', state%displacement, errors)
-    call write_dataset(file, '/state/velocity', state%velocity, errors)
-    call write_dataset(file, '/state/force', state%force, errors)
-    call write_dataset(file, '/state/displacement_gradient', state%displacement_gradient, errors)
-    call write_dataset(file, '/state/stress', state%stress, errors)
-    call write_dataset(file, '/state/history', state%history, errors)
-    call write_dataset(file, '/state/strength', state%strength, errors)
-  end subroutine write_state
+    if (.not. about%kept) return
+    call write_dataset(self%file, place_of(about), values, self%errors)
+    call describe(self%file, about, self%errors)
+  end subroutine write_1
+
+  subroutine write_2(self, about, values)
+    class(writing_t),      intent(inout) :: self
+    type(state_field_t),   intent(in)    :: about
+    real(wp), allocatable, intent(inout) :: values(:, :)
+
+    if (.not. about%kept) return
+    call write_dataset(self%file, place_of(about), values, self%errors)
+    call describe(self%file, about, self%errors)
+  end subroutine write_2
+
+  pure function place_of(about) result(place)
+    type(state_field_t), intent(in) :: about
+    character(:), allocatable :: place
+
+    place = '/state/'//trim(about%name)
+  end function place_of
+
+  !> Unit and sentence of a field, and the names of its components or columns.
+  subroutine describe(file, about, errors)
+    type(hdf5_file_t),   intent(inout) :: file
+    type(state_field_t), intent(in)    :: about
+    type(error_list_t),  intent(inout) :: errors
+    character(:), allocatable :: names, units
+    integer :: k
+
+    names = trim(about%components)
+    units = trim(about%unit)
+    if (allocated(about%columns)) then
+      names = ''
+      units = ''
+      do k = 1, size(about%columns)
+        names = names//' '//trim(about%columns(k)%name)
+        units = units//' '//trim(about%columns(k)%unit)
+      end do
+      names = adjustl(names)
+      units = adjustl(units)
+    end if
+    call write_attribute(file, place_of(about), 'unit', units, errors)
+    call write_attribute(file, place_of(about), 'description', trim(about%description), errors)
+    if (names /= '') call write_attribute(file, place_of(about), 'components', names, errors)
+  end subroutine describe
+
+  subroutine read_1(self, about, values)
+    class(reading_t),      intent(inout) :: self
+    type(state_field_t),   intent(in)    :: about
+    real(wp), allocatable, intent(inout) :: values(:)
+
+    if (about%kept) call read_dataset(self%file, place_of(about), values, self%errors)
+  end subroutine read_1
+
+  subroutine read_2(self, about, values)
+    class(reading_t),      intent(inout) :: self
+    type(state_field_t),   intent(in)    :: about
+    real(wp), allocatable, intent(inout) :: values(:, :)
+
+    if (about%kept) call read_dataset(self%file, place_of(about), values, self%errors)
+  end subroutine read_2
 
   subroutine read_whole(path, checkpoint, state, errors)
     character(*),       intent(in)    :: path
     type(checkpoint_t), intent(inout) :: checkpoint
-    type(state_t),      intent(inout) :: state
+    class(state_t),     intent(inout) :: state
     type(error_list_t), intent(inout) :: errors
-    type(hdf5_file_t) :: file
+    type(reading_t) :: reader
     character(:), allocatable :: found
     integer :: version
 
-    call open_file(file, path, .false., errors)
-    call read_attribute(file, '/', 'schema', found, errors)
-    call read_attribute(file, '/', 'schema_version', version, errors)
-    if (file%is_good() .and. (found /= schema .or. version /= schema_version)) then
+    call open_file(reader%file, path, .false., errors)
+    call read_attribute(reader%file, '/', 'schema', found, errors)
+    call read_attribute(reader%file, '/', 'schema_version', version, errors)
+    if (reader%file%is_good() .and. (found /= schema .or. version /= schema_version)) then
       call errors%add('is not a checkpoint of this version of the program', where=path)
     else
-      call read_numbers(file, checkpoint, errors)
-      call read_state(file, state, errors)
+      call read_numbers(reader%file, checkpoint, errors)
+      reader%errors = errors
+      call state%visit(reader)
+      errors = reader%errors
     end if
-    call close_file(file, errors)
+    call close_file(reader%file, errors)
   end subroutine read_whole
 
   subroutine read_numbers(file, checkpoint, errors)
@@ -194,20 +270,6 @@ contains
     call read_dataset(file, '/volume', checkpoint%volume, errors)
     call read_dataset(file, '/boundary', checkpoint%boundary, errors)
   end subroutine read_numbers
-
-  subroutine read_state(file, state, errors)
-    type(hdf5_file_t),  intent(inout) :: file
-    type(state_t),      intent(inout) :: state
-    type(error_list_t), intent(inout) :: errors
-
-    call read_dataset(file, '/state/displacement', state%displacement, errors)
-    call read_dataset(file, '/state/velocity', state%velocity, errors)
-    call read_dataset(file, '/state/force', state%force, errors)
-    call read_dataset(file, '/state/displacement_gradient', state%displacement_gradient, errors)
-    call read_dataset(file, '/state/stress', state%stress, errors)
-    call read_dataset(file, '/state/history', state%history, errors)
-    call read_dataset(file, '/state/strength', state%strength, errors)
-  end subroutine read_state
 
   !> Whether a file begins with the head that belongs to the rest of it.
   logical function is_whole(path)

@@ -1,28 +1,29 @@
-!> Datasets and attributes of HDF5 files; with `pd_hdf5_file` the one place where return codes of
-!> HDF5 are checked.
+!> Datasets of HDF5 files, and all else that a writer or reader of such files needs.
 !>
 !> Arrays are (n,k) in memory and (n,k) to every reader that counts like C (h5py, ParaView): HDF5
 !> hands dimensions over reversed, so arrays of rank 2 are transposed on the way.
 module pd_hdf5
   use, intrinsic :: iso_c_binding, only: c_char, c_loc, c_null_char, c_ptr
-  use hdf5, only: h5aclose_f, h5acreate_f, h5aexists_by_name_f, h5aget_space_f, h5aget_type_f, &
-    h5aopen_f, h5aread_f, h5awrite_f, h5d_alloc_time_early_f, h5d_contiguous_f, &
-    h5d_fill_time_alloc_f, h5dclose_f, h5dcreate_f, h5dget_space_f, h5dget_type_f, h5dopen_f, &
-    h5dread_f, h5dwrite_f, h5oclose_f, h5oopen_f, h5p_dataset_create_f, h5pclose_f, h5pcreate_f, &
-    h5pset_alloc_time_f, h5pset_fill_time_f, h5pset_layout_f, h5sclose_f, &
-    h5sget_simple_extent_dims_f, h5sget_simple_extent_ndims_f, h5t_ieee_f64le, &
-    h5t_native_double, h5t_native_integer, h5t_std_i32le, h5tclose_f, h5tget_size_f, hid_t, &
-    hsize_t, size_t
+  use hdf5, only: h5d_alloc_time_early_f, h5d_contiguous_f, h5d_fill_time_alloc_f, h5dclose_f, &
+    h5dcreate_f, h5dget_space_f, h5dget_type_f, h5dopen_f, h5dread_f, h5dwrite_f, &
+    h5p_dataset_create_f, h5pclose_f, h5pcreate_f, h5pset_alloc_time_f, h5pset_fill_time_f, &
+    h5pset_layout_f, h5s_select_set_f, h5sclose_f, h5screate_simple_f, &
+    h5sget_simple_extent_dims_f, h5sget_simple_extent_ndims_f, h5sselect_hyperslab_f, &
+    h5t_ieee_f64le, h5t_native_double, h5t_native_integer, h5t_std_i32le, h5tclose_f, &
+    h5tget_size_f, hid_t, hsize_t, size_t
   use pd_errors, only: error_list_t
-  use pd_hdf5_file, only: check, close_file, create_file, create_group, flush_file, hdf5_file_t, &
-    make_space, make_text_type, object_exists, open_file
+  use pd_hdf5_attributes, only: read_attribute, write_attribute
+  use pd_hdf5_file, only: characters, check, close_file, create_file, create_group, flush_file, &
+    hdf5_file_t, make_space, make_text_type, object_exists, open_file, text_of
   use pd_kinds, only: wp
   implicit none
   private
 
   public :: hdf5_file_t, create_file, open_file, flush_file, close_file
   public :: create_group, object_exists
-  public :: reserve_dataset, write_dataset, overwrite_dataset, overwrite_rows, read_dataset
+  public :: reserve_dataset, reserve_whole_numbers
+  public :: write_dataset, overwrite_dataset, overwrite_rows, overwrite_part
+  public :: read_dataset, read_rows
   public :: write_attribute, read_attribute
 
   !> Put an array into the file as a new dataset.
@@ -40,19 +41,7 @@ module pd_hdf5
     module procedure read_real_1, read_real_2, read_integer_1, read_texts
   end interface read_dataset
 
-  !> Set an attribute of an object: in place where it is there already.
-  interface write_attribute
-    module procedure write_attribute_integer, write_attribute_real, write_attribute_reals, &
-      write_attribute_text
-  end interface write_attribute
-
-  interface read_attribute
-    module procedure read_attribute_integer, read_attribute_real, read_attribute_text
-  end interface read_attribute
-
 contains
-
-  ! ---- datasets -----------------------------------------------------------------------------
 
   !> Create a real dataset of this shape and fill it with zeros, so that its space on the disk is
   !> taken now: later writes change bytes in place and nothing else.
@@ -64,6 +53,16 @@ contains
 
     call create_dataset(file, name, h5t_ieee_f64le, shape_seen, errors)
   end subroutine reserve_dataset
+
+  !> The same for whole numbers.
+  subroutine reserve_whole_numbers(file, name, shape_seen, errors)
+    type(hdf5_file_t),  intent(inout) :: file
+    character(*),       intent(in)    :: name
+    integer,            intent(in)    :: shape_seen(:)
+    type(error_list_t), intent(inout) :: errors
+
+    call create_dataset(file, name, h5t_std_i32le, shape_seen, errors)
+  end subroutine reserve_whole_numbers
 
   subroutine create_dataset(file, name, data_type, shape_seen, errors)
     type(hdf5_file_t),  intent(inout) :: file
@@ -184,14 +183,61 @@ contains
     real(wp), target,   intent(in), contiguous :: values(:, :)   !! (components,points)
     type(error_list_t), intent(inout) :: errors
 
+    call expect_rows(file, name, values, errors)
+    if (size(values) > 0) &
+      call put_data(file, name, h5t_native_double, c_loc(values), errors)
+  end subroutine overwrite_rows
+
+  !> Report an error unless a dataset has the shape of these rows.
+  subroutine expect_rows(file, name, values, errors)
+    type(hdf5_file_t),  intent(inout) :: file
+    character(*),       intent(in)    :: name
+    real(wp),           intent(in)    :: values(:, :)   !! (components,points)
+    type(error_list_t), intent(inout) :: errors
+
     if (size(values, 1) == 1) then
       call expect_shape(file, name, [size(values, 2)], errors)
     else
       call expect_shape(file, name, [size(values, 2), size(values, 1)], errors)
     end if
-    if (size(values) > 0) &
-      call put_data(file, name, h5t_native_double, c_loc(values), errors)
-  end subroutine overwrite_rows
+  end subroutine expect_rows
+
+  !> Write some of the values of a dataset of rank 1, the first of them at place `first` (from 1).
+  !> Whole numbers are stored as such where the dataset has them.
+  !>
+  !> Errors: a dataset that ends before, a file that cannot be written.
+  subroutine overwrite_part(file, name, first, values, errors)
+    type(hdf5_file_t),  intent(inout) :: file
+    character(*),       intent(in)    :: name
+    integer,            intent(in)    :: first
+    real(wp),           intent(in)    :: values(:)
+    type(error_list_t), intent(inout) :: errors
+    real(wp), allocatable, target :: buffer(:)
+    integer(hid_t)   :: dataset, space, part
+    integer(hsize_t) :: start(1), length(1)
+    integer :: status, ignored
+
+    if (.not. file%is_good() .or. size(values) == 0) return
+    allocate (buffer, source=values)
+    start = int(first - 1, hsize_t)
+    length = size(values, kind=hsize_t)
+    call h5dopen_f(file%id, name, dataset, status)
+    call check(file, status, name//' cannot be opened', errors)
+    if (file%failed) return
+    call h5dget_space_f(dataset, space, status)
+    if (status >= 0) then
+      call h5sselect_hyperslab_f(space, h5s_select_set_f, start, length, status)
+      if (status >= 0) call h5screate_simple_f(1, length, part, status)
+      if (status >= 0) then
+        call h5dwrite_f(dataset, h5t_native_double, c_loc(buffer), status, part, space)
+        call h5sclose_f(part, ignored)
+      end if
+      call h5sclose_f(space, ignored)
+    end if
+    call check(file, status, name//' cannot be written', errors)
+    call h5dclose_f(dataset, status)
+    if (.not. file%failed) call check(file, status, name//' cannot be written', errors)
+  end subroutine overwrite_part
 
   subroutine write_integer_1(file, name, values, errors)
     type(hdf5_file_t),  intent(inout) :: file
@@ -241,27 +287,7 @@ contains
     call h5tclose_f(text_type, status)
   end subroutine write_characters
 
-  !> Strings as an array of single characters, null characters behind each. With `trimmed` the
-  !> blanks at the end of each string do not count. HDF5 knows no strings of length 0.
-  pure function characters(texts, trimmed) result(values)
-    character(*), intent(in) :: texts(:)
-    logical,      intent(in) :: trimmed
-    character(kind=c_char), allocatable :: values(:, :)
-    integer :: i, j, length
-
-    length = len(texts)
-    if (trimmed .and. size(texts) > 0) length = maxval(len_trim(texts))
-    allocate (values(max(length, 1), size(texts)))
-    values = c_null_char
-    do j = 1, size(texts)
-      if (trimmed) length = len_trim(texts(j))
-      do i = 1, length
-        values(i, j) = texts(j)(i:i)
-      end do
-    end do
-  end function characters
-
-  !> See to it that a dataset has this shape.
+  !> Report an error unless a dataset has this shape.
   subroutine expect_shape(file, name, shape_wanted, errors)
     type(hdf5_file_t),  intent(inout) :: file
     character(*),       intent(in)    :: name
@@ -331,6 +357,21 @@ contains
     allocate (values, source=transpose(buffer))
   end subroutine read_real_2
 
+  !> Read a dataset of a known shape into an array that lies in memory as in the file, the other
+  !> way round than `overwrite_rows`.
+  !>
+  !> Errors: another shape, a file that cannot be read.
+  subroutine read_rows(file, name, values, errors)
+    type(hdf5_file_t),  intent(inout) :: file
+    character(*),       intent(in)    :: name
+    real(wp), target,   intent(out), contiguous :: values(:, :)   !! (components,points)
+    type(error_list_t), intent(inout) :: errors
+
+    values = 0.0_wp
+    call expect_rows(file, name, values, errors)
+    if (size(values) > 0) call take_data(file, name, h5t_native_double, c_loc(values), errors)
+  end subroutine read_rows
+
   subroutine read_integer_1(file, name, values, errors)
     type(hdf5_file_t),    intent(inout) :: file
     character(*),         intent(in)    :: name
@@ -395,201 +436,5 @@ contains
     end if
     call check(file, status, name//' cannot be read', errors)
   end subroutine find_length
-
-  !> The characters up to the first null character.
-  pure function text_of(values) result(text)
-    character(kind=c_char), intent(in) :: values(:)
-    character(size(values)) :: text
-    integer :: i
-
-    text = ''
-    do i = 1, size(values)
-      if (values(i) == c_null_char) exit
-      text(i:i) = values(i)
-    end do
-  end function text_of
-
-  ! ---- attributes ---------------------------------------------------------------------------
-
-  subroutine write_attribute_integer(file, object, name, value, errors)
-    type(hdf5_file_t),  intent(inout) :: file
-    character(*),       intent(in)    :: object, name   !! object '/': the file itself
-    integer,            intent(in)    :: value
-    type(error_list_t), intent(inout) :: errors
-    integer, target :: buffer
-    integer :: no_shape(0)
-
-    buffer = value
-    call put_attribute(file, object, name, [h5t_std_i32le, h5t_native_integer], no_shape, &
-      c_loc(buffer), errors)
-  end subroutine write_attribute_integer
-
-  subroutine write_attribute_real(file, object, name, value, errors)
-    type(hdf5_file_t),  intent(inout) :: file
-    character(*),       intent(in)    :: object, name
-    real(wp),           intent(in)    :: value
-    type(error_list_t), intent(inout) :: errors
-    real(wp), target :: buffer
-    integer :: no_shape(0)
-
-    buffer = value
-    call put_attribute(file, object, name, [h5t_ieee_f64le, h5t_native_double], no_shape, &
-      c_loc(buffer), errors)
-  end subroutine write_attribute_real
-
-  subroutine write_attribute_reals(file, object, name, values, errors)
-    type(hdf5_file_t),  intent(inout) :: file
-    character(*),       intent(in)    :: object, name
-    real(wp),           intent(in)    :: values(:)
-    type(error_list_t), intent(inout) :: errors
-    real(wp), allocatable, target :: buffer(:)
-
-    allocate (buffer, source=values)
-    call put_attribute(file, object, name, [h5t_ieee_f64le, h5t_native_double], shape(values), &
-      c_loc(buffer), errors)
-  end subroutine write_attribute_reals
-
-  !> Set a string attribute; it must not exist, as its length is its type.
-  subroutine write_attribute_text(file, object, name, text, errors)
-    type(hdf5_file_t),  intent(inout) :: file
-    character(*),       intent(in)    :: object, name, text
-    type(error_list_t), intent(inout) :: errors
-    character(kind=c_char), allocatable, target :: buffer(:, :)
-    integer(hid_t) :: text_type
-    integer :: status, no_shape(0)
-
-    if (.not. file%is_good()) return
-    allocate (buffer, source=characters([text], .true.))
-    call make_text_type(size(buffer, 1), text_type, status)
-    call put_attribute(file, object, name, [text_type, text_type], no_shape, c_loc(buffer), errors)
-    call h5tclose_f(text_type, status)
-  end subroutine write_attribute_text
-
-  subroutine put_attribute(file, object, name, types, shape_seen, values, errors)
-    type(hdf5_file_t),  intent(inout) :: file
-    character(*),       intent(in)    :: object, name
-    integer(hid_t),     intent(in)    :: types(2)        !! in the file, in memory
-    integer,            intent(in)    :: shape_seen(:)   !! size 0: a scalar
-    type(c_ptr),        intent(in)    :: values
-    type(error_list_t), intent(inout) :: errors
-    integer(hid_t) :: holder, attribute, space
-    integer :: status, ignored
-    logical :: there
-
-    if (.not. file%is_good()) return
-    call h5oopen_f(file%id, object, holder, status)
-    call check(file, status, object//' cannot be opened', errors)
-    if (file%failed) return
-    call h5aexists_by_name_f(file%id, object, name, there, status)
-    if (status >= 0 .and. there) then
-      call h5aopen_f(holder, name, attribute, status)
-    else if (status >= 0) then
-      call make_space(shape_seen, space, status)
-      if (status >= 0) call h5acreate_f(holder, name, types(1), space, attribute, status)
-      call h5sclose_f(space, ignored)
-    end if
-    if (status >= 0) then
-      call h5awrite_f(attribute, types(2), values, status)
-      call check(file, status, 'attribute '//name//' of '//object//' cannot be written', errors)
-      call h5aclose_f(attribute, ignored)
-    else
-      call check(file, status, 'attribute '//name//' of '//object//' cannot be written', errors)
-    end if
-    call h5oclose_f(holder, ignored)
-  end subroutine put_attribute
-
-  subroutine read_attribute_integer(file, object, name, value, errors)
-    type(hdf5_file_t),  intent(inout) :: file
-    character(*),       intent(in)    :: object, name
-    integer,            intent(out)   :: value   !! 0 after a failure
-    type(error_list_t), intent(inout) :: errors
-    integer, target :: buffer
-
-    buffer = 0
-    call fetch_attribute(file, object, name, h5t_native_integer, c_loc(buffer), errors)
-    value = buffer
-  end subroutine read_attribute_integer
-
-  subroutine read_attribute_real(file, object, name, value, errors)
-    type(hdf5_file_t),  intent(inout) :: file
-    character(*),       intent(in)    :: object, name
-    real(wp),           intent(out)   :: value   !! 0 after a failure
-    type(error_list_t), intent(inout) :: errors
-    real(wp), target :: buffer
-
-    buffer = 0.0_wp
-    call fetch_attribute(file, object, name, h5t_native_double, c_loc(buffer), errors)
-    value = buffer
-  end subroutine read_attribute_real
-
-  subroutine fetch_attribute(file, object, name, memory_type, values, errors)
-    type(hdf5_file_t),  intent(inout) :: file
-    character(*),       intent(in)    :: object, name
-    integer(hid_t),     intent(in)    :: memory_type
-    type(c_ptr),        intent(in)    :: values   !! room for one value
-    type(error_list_t), intent(inout) :: errors
-    integer(hid_t) :: attribute
-    type(c_ptr) :: address
-    integer :: status, ignored
-
-    call open_attribute(file, object, name, attribute, errors)
-    if (.not. file%is_good()) return
-    address = values
-    call h5aread_f(attribute, memory_type, address, status)
-    call check(file, status, 'attribute '//name//' of '//object//' cannot be read', errors)
-    call h5aclose_f(attribute, ignored)
-  end subroutine fetch_attribute
-
-  !> Open an attribute that holds a scalar.
-  subroutine open_attribute(file, object, name, attribute, errors)
-    type(hdf5_file_t),  intent(inout) :: file
-    character(*),       intent(in)    :: object, name
-    integer(hid_t),     intent(out)   :: attribute
-    type(error_list_t), intent(inout) :: errors
-    integer(hid_t) :: holder, space
-    integer :: status, ignored, found_rank
-
-    attribute = -1
-    if (.not. file%is_good()) return
-    call h5oopen_f(file%id, object, holder, status)
-    call check(file, status, object//' cannot be opened', errors)
-    if (file%failed) return
-    call h5aopen_f(holder, name, attribute, status)
-    if (status >= 0) then
-      call h5aget_space_f(attribute, space, status)
-      if (status >= 0) call h5sget_simple_extent_ndims_f(space, found_rank, status)
-      if (status >= 0 .and. found_rank /= 0) status = -1
-      call h5sclose_f(space, ignored)
-      if (status < 0) call h5aclose_f(attribute, ignored)
-    end if
-    call check(file, status, object//' has no readable attribute '//name, errors)
-    call h5oclose_f(holder, ignored)
-  end subroutine open_attribute
-
-  subroutine read_attribute_text(file, object, name, text, errors)
-    type(hdf5_file_t),         intent(inout) :: file
-    character(*),              intent(in)    :: object, name
-    character(:), allocatable, intent(out)   :: text   !! '' after a failure
-    type(error_list_t),        intent(inout) :: errors
-    character(kind=c_char), allocatable, target :: buffer(:)
-    integer(hid_t)  :: attribute, text_type
-    integer(size_t) :: length
-    type(c_ptr) :: address
-    integer :: status, ignored
-
-    text = ''
-    call open_attribute(file, object, name, attribute, errors)
-    if (.not. file%is_good()) return
-    call h5aget_type_f(attribute, text_type, status)
-    if (status >= 0) call h5tget_size_f(text_type, length, status)
-    if (status < 0) length = 1
-    allocate (buffer(length))
-    address = c_loc(buffer)
-    if (status >= 0) call h5aread_f(attribute, text_type, address, status)
-    call check(file, status, 'attribute '//name//' of '//object//' cannot be read', errors)
-    if (.not. file%failed) text = trim(text_of(buffer))
-    call h5tclose_f(text_type, ignored)
-    call h5aclose_f(attribute, ignored)
-  end subroutine read_attribute_text
 
 end module pd_hdf5

@@ -1,6 +1,6 @@
 !> HDF5 files: opening, closing, groups, and what happens when the library says no.
 !>
-!> Together with `pd_hdf5`, which adds datasets and attributes, the one place where return codes of
+!> Together with `pd_hdf5` and `pd_hdf5_attributes` the one place where return codes of
 !> HDF5 are checked. After the first failure a file does nothing more and reports nothing more: a
 !> sequence of calls needs no check in between. The library is never closed, and told not to close
 !> itself at the end of the program: after a failed write (a full disk) it would try again then.
@@ -20,11 +20,11 @@ module pd_hdf5_file
 
   public :: hdf5_file_t, create_file, open_file, flush_file, close_file
   public :: create_group, object_exists
-  public :: check, make_space, make_text_type
+  public :: check, make_space, make_text_type, characters, text_of
 
   !> A file that is open. It does nothing more once something has failed.
   type :: hdf5_file_t
-    integer(hid_t) :: id = -1          !! the library's, for `pd_hdf5`
+    integer(hid_t) :: id = -1          !! the library's, for datasets and attributes
     logical :: failed = .false.
     character(:), allocatable :: path
   contains
@@ -195,6 +195,8 @@ contains
     end if
   end subroutine make_space
 
+  ! ---- strings ------------------------------------------------------------------------------
+
   !> A string type of fixed length, UTF-8, padded with null characters.
   subroutine make_text_type(length, text_type, status)
     integer,        intent(in)  :: length
@@ -207,6 +209,39 @@ contains
     if (status >= 0) call h5tset_strpad_f(text_type, h5t_str_nullpad_f, status)
     if (status >= 0) call h5tset_cset_f(text_type, utf_8, status)
   end subroutine make_text_type
+
+  !> Strings as an array of single characters, null characters behind each. With `trimmed` the
+  !> blanks at the end of each string do not count. HDF5 knows no strings of length 0.
+  pure function characters(texts, trimmed) result(values)
+    character(*), intent(in) :: texts(:)
+    logical,      intent(in) :: trimmed
+    character(kind=c_char), allocatable :: values(:, :)
+    integer :: i, j, length
+
+    length = len(texts)
+    if (trimmed .and. size(texts) > 0) length = maxval(len_trim(texts))
+    allocate (values(max(length, 1), size(texts)))
+    values = c_null_char
+    do j = 1, size(texts)
+      if (trimmed) length = len_trim(texts(j))
+      do i = 1, length
+        values(i, j) = texts(j)(i:i)
+      end do
+    end do
+  end function characters
+
+  !> The characters up to the first null character.
+  pure function text_of(values) result(text)
+    character(kind=c_char), intent(in) :: values(:)
+    character(size(values)) :: text
+    integer :: i
+
+    text = ''
+    do i = 1, size(values)
+      if (values(i) == c_null_char) exit
+      text(i:i) = values(i)
+    end do
+  end function text_of
 
   ! ---- failures -----------------------------------------------------------------------------
 

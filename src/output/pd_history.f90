@@ -8,37 +8,19 @@ module pd_history
   use pd_errors, only: error_list_t
   use pd_files, only: close_output, flush_output, open_output, output_file_t, replace_file, &
     write_line
-  use pd_kinds, only: wp
+  use pd_kinds, only: i8, wp
+  use pd_observe, only: column_t
   use pd_system, only: remove_file
   use pd_text, only: integer_text
   implicit none
   private
 
-  public :: history_t, history_row_t, create_history, resume_history, write_row, close_history
-
-  !> The values of one row, in the order of the columns.
-  type :: history_row_t
-    integer  :: step = 0
-    real(wp) :: time = 0.0_wp                     !! [s]
-    real(wp) :: strain = 0.0_wp                   !! nominal; without platens not written
-    real(wp), allocatable :: force(:, :)          !! (boundaries,2) on the body [N/m]
-    real(wp) :: mean_stress_xx = 0.0_wp           !! [Pa]
-    real(wp) :: mean_stress_yy = 0.0_wp           !! [Pa]
-    real(wp) :: mean_strain_yy = 0.0_wp
-    real(wp) :: max_plastic_strain = 0.0_wp
-    real(wp) :: kinetic_energy = 0.0_wp           !! [J/m], as all energies
-    real(wp) :: strain_energy = 0.0_wp
-    real(wp) :: plastic_dissipation = 0.0_wp
-    real(wp) :: damping_dissipation = 0.0_wp
-    real(wp) :: stabilisation_energy = 0.0_wp
-    real(wp) :: external_work = 0.0_wp
-    real(wp) :: energy_error = 0.0_wp             !! relative
-  end type history_row_t
+  public :: history_t, create_history, resume_history, write_row, close_history
 
   !> A history that is being written.
   type :: history_t
     integer :: rows = 0   !! rows written so far, those before a restart among them
-    logical, private :: has_strain = .false.
+    logical, allocatable, private :: whole(:)   !! of the columns: whole numbers
     type(output_file_t), private :: file
   end type history_t
 
@@ -47,16 +29,15 @@ contains
   !> Start a history, replacing one of that name.
   !>
   !> Errors: the file cannot be written.
-  subroutine create_history(history, stem, boundary_names, has_strain, errors)
+  subroutine create_history(history, stem, columns, errors)
     type(history_t),    intent(out)   :: history
     character(*),       intent(in)    :: stem   !! output folder and name of the run
-    character(*),       intent(in)    :: boundary_names(:)
-    logical,            intent(in)    :: has_strain   !! whether there are platens
+    type(column_t),     intent(in)    :: columns(:)
     type(error_list_t), intent(inout) :: errors
 
-    history%has_strain = has_strain
+    history%whole = columns%whole_number
     call open_output(history%file, stem//'_history.csv', .false., errors)
-    call write_line(history%file, header(boundary_names, has_strain), errors)
+    call write_line(history%file, header(columns), errors)
     call flush_output(history%file, errors)
   end subroutine create_history
 
@@ -64,11 +45,10 @@ contains
   !>
   !> Errors: the file is missing, has other columns or too few rows, or cannot be written; it is
   !> then as it was.
-  subroutine resume_history(history, stem, boundary_names, has_strain, rows, errors)
+  subroutine resume_history(history, stem, columns, rows, errors)
     type(history_t),    intent(out)   :: history
     character(*),       intent(in)    :: stem
-    character(*),       intent(in)    :: boundary_names(:)
-    logical,            intent(in)    :: has_strain
+    type(column_t),     intent(in)    :: columns(:)
     integer,            intent(in)    :: rows   !! written up to the checkpoint
     type(error_list_t), intent(inout) :: errors
     character(:), allocatable :: path
@@ -76,9 +56,9 @@ contains
 
     path = stem//'_history.csv'
     before = errors%count()
-    call cut_back(path, header(boundary_names, has_strain), rows, errors)
+    call cut_back(path, header(columns), rows, errors)
     if (errors%count() > before) return
-    history%has_strain = has_strain
+    history%whole = columns%whole_number
     history%rows = rows
     call open_output(history%file, path, .true., errors)
   end subroutine resume_history
@@ -86,29 +66,12 @@ contains
   !> Append a row and hand it to the operating system.
   !>
   !> Errors: the file cannot be written to; reported once.
-  subroutine write_row(history, row, errors)
-    type(history_t),     intent(inout) :: history
-    type(history_row_t), intent(in)    :: row
-    type(error_list_t),  intent(inout) :: errors
-    real(wp) :: numbers(13 + 2 * size(row%force, 1))
-    character(12) :: step
-    integer :: n, k
+  subroutine write_row(history, values, errors)
+    type(history_t),    intent(inout) :: history
+    real(wp),           intent(in)    :: values(:)   !! in the order of the columns
+    type(error_list_t), intent(inout) :: errors
 
-    numbers(1) = row%time
-    n = 1
-    if (history%has_strain) then
-      n = 2
-      numbers(2) = row%strain
-    end if
-    do k = 1, size(row%force, 1)
-      numbers(n + 1:n + 2) = row%force(k, :)
-      n = n + 2
-    end do
-    numbers(n + 1:n + 11) = [row%mean_stress_xx, row%mean_stress_yy, row%mean_strain_yy, &
-      row%max_plastic_strain, row%kinetic_energy, row%strain_energy, row%plastic_dissipation, &
-      row%damping_dissipation, row%stabilisation_energy, row%external_work, row%energy_error]
-    write (step, '(i0)') row%step
-    call write_line(history%file, trim(step)//comma_separated(numbers(:n + 11)), errors)
+    call write_line(history%file, comma_separated(values, history%whole), errors)
     call flush_output(history%file, errors)
     if (history%file%is_open()) history%rows = history%rows + 1
   end subroutine write_row
@@ -179,41 +142,38 @@ contains
     end do
   end subroutine read_line
 
-  pure function header(boundary_names, has_strain) result(text)
-    character(*), intent(in) :: boundary_names(:)
-    logical,      intent(in) :: has_strain
+  pure function header(columns) result(text)
+    type(column_t), intent(in) :: columns(:)
     character(:), allocatable :: text
     integer :: k
 
-    text = 'step,time'
-    if (has_strain) text = text//',strain'
-    do k = 1, size(boundary_names)
-      text = text//','//trim(boundary_names(k))//'_force_x,'//trim(boundary_names(k))//'_force_y'
+    text = ''
+    do k = 1, size(columns)
+      text = text//','//trim(columns(k)%name)
     end do
-    text = text//',mean_stress_xx,mean_stress_yy,mean_strain_yy,max_plastic_strain,' &
-      //'kinetic_energy,strain_energy,plastic_dissipation,damping_dissipation,' &
-      //'stabilisation_energy,external_work,energy_error'
+    text = text(2:)
   end function header
 
-  !> Numbers with 17 significant digits, each after a comma.
-  pure function comma_separated(numbers) result(text)
+  !> Whole numbers as such, others with 17 significant digits, commas between.
+  pure function comma_separated(numbers, whole) result(text)
     real(wp), intent(in) :: numbers(:)
+    logical,  intent(in) :: whole(:)
     character(:), allocatable :: text
     integer, parameter :: width = 24   !! of a number with its sign
-    character(width * size(numbers)) :: cells
     character((width + 1) * size(numbers)) :: line
-    integer :: k, first, length
+    character(width) :: cells(size(numbers))
+    integer :: k, length, more
 
-    write (cells, '(*(es24.16e3))') numbers
+    write (cells, '(es24.16e3)') numbers
     length = 0
     do k = 1, size(numbers)
-      first = width * (k - 1) + 1
-      if (cells(first:first) == ' ') first = first + 1
-      line(length + 1:length + 1) = ','
-      line(length + 2:length + 2 + width * k - first) = cells(first:width * k)
-      length = length + 2 + width * k - first
+      if (whole(k)) write (cells(k), '(i0)') int(numbers(k), i8)
+      cells(k) = adjustl(cells(k))
+      more = len_trim(cells(k)) + 1
+      line(length + 1:length + more) = cells(k)(:more - 1)//','
+      length = length + more
     end do
-    text = line(:length)
+    text = line(:length - 1)
   end function comma_separated
 
 end module pd_history

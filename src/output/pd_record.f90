@@ -3,25 +3,26 @@
 !> The only module that knows both the physics and the output.
 module pd_record
   use, intrinsic :: iso_fortran_env, only: compiler_version
-  use pd_boundary, only: nominal_strain
   use pd_checkpoint, only: checkpoint_exists, checkpoint_t, read_checkpoint, remove_checkpoints, &
     write_checkpoint
   use pd_clock, only: clock_t
   use pd_errors, only: error_list_t
   use pd_files, only: prepare_folder
+  use pd_frame_fields, only: frame_fields
   use pd_geometry, only: body_t
-  use pd_history, only: close_history, create_history, history_row_t, history_t, resume_history, &
-    write_row
+  use pd_history, only: close_history, create_history, history_t, resume_history, write_row
+  use pd_history_columns, only: history_columns
   use pd_input, only: compare_used, used_values
   use pd_input_types, only: input_t
   use pd_kinds, only: wp
-  use pd_ledger, only: ledger_t
-  use pd_observe, only: observation_t, observe, point_field
-  use pd_progress, only: close_progress, open_progress, progress_t, say, show_progress, status_t
-  use pd_result, only: create_result, finish_result, frame_source_t, provenance_t, &
-    result_exists, result_t, resume_result, run_description_t, write_failed_frame, write_frame
-  use pd_schedule, only: schedule_t
   use pd_model, only: model_t
+  use pd_ledger, only: ledger_t
+  use pd_observe, only: column_t, moment_at, moment_t, observation_t, observe
+  use pd_progress, only: close_progress, open_progress, progress_t, say, show_progress, status_t
+  use pd_result, only: add_row, create_result, finish_result, places_t, result_exists, result_t, &
+    resume_result, write_failed_frame, write_frame, write_rows
+  use pd_run_description, only: provenance_t, run_description_t
+  use pd_schedule, only: rows_due, schedule_t
   use pd_state, only: state_t
   use pd_version, only: build_flags, code_version, git_hash
   implicit none
@@ -38,18 +39,11 @@ module pd_record
     type(result_t)      :: result
     type(history_t)     :: history
     type(progress_t)    :: progress
-    type(observation_t) :: seen                  !! of the last row
+    type(column_t), allocatable :: columns(:)    !! of the history
+    type(moment_t)      :: moment                !! of the last look at the state
+    type(observation_t) :: seen                  !! at this moment
     integer :: frames = 0                        !! written so far, 000000 among them
   end type record_t
-
-  !> The present state as the source of a frame.
-  type, extends(frame_source_t) :: state_frame_t
-    type(model_t), pointer :: model => null()
-    type(state_t), pointer :: state => null()
-  contains
-    procedure :: points => points_of_state
-    procedure :: field => field_of_state
-  end type state_frame_t
 
   character(*), parameter :: ledger_names(3) = [character(24) :: 'initial_kinetic_energy', &
     'largest_work', 'outer_work']
@@ -64,7 +58,7 @@ contains
     if (.not. results_in_the_way) results_in_the_way = checkpoint_exists(stem)
   end function results_in_the_way
 
-  !> Open all outputs: anew, or behind a checkpoint (`step` > 0 or rows in the history).
+  !> Open all outputs: anew, or behind a checkpoint (rows in the history).
   !>
   !> Errors: a file cannot be written; on a restart, results that do not fit the checkpoint.
   subroutine open_record(input, command, threads, model, schedule, checkpoint, quiet, record, &
@@ -74,37 +68,37 @@ contains
     integer,            intent(in)    :: threads
     type(model_t),      intent(in)    :: model
     type(schedule_t),   intent(in)    :: schedule
-    type(checkpoint_t), intent(in)    :: checkpoint   !! history_rows 0: a new run
+    type(checkpoint_t), intent(in)    :: checkpoint   !! history_rows 0: a new run, but its clock
     logical,            intent(in)    :: quiet
     type(record_t),     intent(out)   :: record
     type(error_list_t), intent(inout) :: errors
     type(run_description_t) :: description
-    logical :: platens, restart
-    integer :: n_new
+    logical :: restart
 
     record%stem = input%run%output_dir//'/'//input%run%name
     record%values = used_values(input)
     restart = checkpoint%history_rows > 0
-    platens = model%platens%axis > 0
     call describe_run(input, command, threads, model, schedule, description)
-    description%time_step = checkpoint%clock%time_step
     description%values = record%values
+    description%time_step = checkpoint%clock%time_step
+    record%columns = description%columns
     call prepare_folder(input%run%output_dir, errors)
     if (errors%count() > 0) return
     if (restart) then
-      n_new = count(schedule%frame_steps > checkpoint%clock%step)
-      call resume_result(record%result, record%stem, description, checkpoint%frames_written, &
-        n_new, checkpoint%clock%step, errors)
-      if (errors%count() == 0) call resume_history(record%history, record%stem, &
-        description%boundary_names, platens, checkpoint%history_rows, errors)
+      call resume_result(record%result, record%stem, description, &
+        places_t(checkpoint%frames_written, checkpoint%history_rows), &
+        places_t(count(schedule%frame_steps > checkpoint%clock%step), &
+        rows_due(schedule, checkpoint%clock%step)), checkpoint%clock%step, errors)
+      if (errors%count() == 0) call resume_history(record%history, record%stem, record%columns, &
+        checkpoint%history_rows, errors)
       record%frames = checkpoint%frames_written
     else
       ! the old checkpoints go last: until the new result is there a full disk must cost nothing
       call create_result(record%result, record%stem, description, &
-        size(schedule%frame_steps) + 1, errors)
+        places_t(size(schedule%frame_steps) + 1, rows_due(schedule, 0) + 1), errors)
       if (errors%count() == 0) call remove_checkpoints(record%stem, errors)
-      if (errors%count() == 0) call create_history(record%history, record%stem, &
-        description%boundary_names, platens, errors)
+      if (errors%count() == 0) &
+        call create_history(record%history, record%stem, record%columns, errors)
     end if
     if (errors%count() == 0) &
       call open_progress(record%progress, record%stem, restart, quiet, errors)
@@ -133,16 +127,17 @@ contains
     description%lower = model%body%lower
     description%upper = model%body%upper
     description%steps = schedule%steps
-    associate (body => model%body, places => model%body%points)
-      description%position = body%position(places, :)
-      description%volume = body%volume(places)
-      description%boundary = body%boundary(places)
-      if (model%materials%columns() > 0) description%yield_stress = model%strength(places)
-    end associate
+    description%position = model%body%position
+    description%volume = model%body%volume
+    description%boundary = model%body%boundary
+    if (size(model%materials%remembered()) > 0) &
+      description%yield_stress = model%strength(model%operators%storage%row)
     allocate (character(64) :: description%boundary_names(size(model%boundaries)))
     do k = 1, size(model%boundaries)
       description%boundary_names(k) = model%boundaries(k)%name
     end do
+    call frame_fields(description%fields)
+    call history_columns(model, description%columns)
   end subroutine describe_run
 
   !> Close all outputs of a run that has come to its end.
@@ -155,106 +150,49 @@ contains
     call close_progress(record%progress, errors)
   end subroutine close_record
 
-  !> Observe the state; what is seen stays in the record.
-  subroutine observe_state(model, state, ledger, record)
+  !> Observe the state after a step; what is seen stays in the record.
+  subroutine observe_state(model, state, ledger, clock, record)
     type(model_t),  intent(in)    :: model
     type(state_t),  intent(in)    :: state
     type(ledger_t), intent(in)    :: ledger
+    type(clock_t),  intent(in)    :: clock
     type(record_t), intent(inout) :: record
 
-    call observe(model, state, ledger, record%seen)
+    record%moment = moment_at(clock, model, state, ledger)
+    call observe(record%columns, model, state, record%moment, record%seen)
   end subroutine observe_state
 
-  !> Write a row of the history with what was seen of the state.
-  subroutine record_row(model, state, clock, record, errors)
-    type(model_t),      intent(in)    :: model
-    type(state_t),      intent(in)    :: state
-    type(clock_t),      intent(in)    :: clock
+  !> Write a row of the history with what was seen last.
+  subroutine record_row(record, errors)
     type(record_t),     intent(inout) :: record
     type(error_list_t), intent(inout) :: errors
-    type(history_row_t) :: row
-    integer :: k
 
-    row%step = clock%step
-    row%time = clock%time()
-    row%strain = strain_at(model, state, row%time)
-    allocate (row%force(size(model%boundaries), 2))
-    do k = 1, size(model%boundaries)
-      row%force(k, :) = model%boundaries(k)%force
-    end do
-    associate (seen => record%seen)
-      row%mean_stress_xx = seen%mean_stress_xx
-      row%mean_stress_yy = seen%mean_stress_yy
-      row%mean_strain_yy = seen%mean_strain_yy
-      row%max_plastic_strain = seen%max_plastic_strain
-      row%kinetic_energy = seen%kinetic_energy
-      row%strain_energy = seen%strain_energy
-      row%plastic_dissipation = seen%plastic_dissipation
-      row%damping_dissipation = seen%damping_dissipation
-      row%stabilisation_energy = seen%stabilisation_energy
-      row%external_work = seen%external_work
-      row%energy_error = seen%energy_error
-    end associate
-    call write_row(record%history, row, errors)
+    call write_row(record%history, record%seen%values, errors)
+    call add_row(record%result, record%seen%values, errors)
   end subroutine record_row
 
-  !> Nominal strain, 0 where there are no platens.
-  pure real(wp) function strain_at(model, state, time) result(strain)
-    type(model_t), intent(in) :: model
-    type(state_t), intent(in) :: state
-    real(wp),      intent(in) :: time   !! [s]
-
-    strain = 0.0_wp
-    if (model%platens%axis > 0) strain = nominal_strain(model%platens, model%boundaries, time, &
-      state%displacement)
-  end function strain_at
-
-  !> Write the next frame.
-  subroutine record_frame(model, state, clock, record, errors)
-    type(model_t), target, intent(in) :: model
-    type(state_t), target, intent(in) :: state
-    type(clock_t),      intent(in)    :: clock
+  !> Write the next frame, of the moment seen last.
+  subroutine record_frame(model, state, record, errors)
+    type(model_t),      intent(in)    :: model
+    type(state_t),      intent(in)    :: state
     type(record_t),     intent(inout) :: record
     type(error_list_t), intent(inout) :: errors
-    type(state_frame_t) :: source
 
-    source%model => model
-    source%state => state
-    call write_frame(record%result, record%frames, clock%step, clock%time(), &
-      strain_at(model, state, clock%time()), source, errors)
+    call write_frame(record%result, record%frames, record%moment, model, state, errors)
     record%frames = record%frames + 1
   end subroutine record_frame
 
   !> Write the state of a run that has failed, marked as not valid.
   subroutine record_failure(model, state, clock, record, errors)
-    type(model_t), target, intent(in) :: model
-    type(state_t), target, intent(in) :: state
+    type(model_t),      intent(in)    :: model
+    type(state_t),      intent(in)    :: state
     type(clock_t),      intent(in)    :: clock
     type(record_t),     intent(inout) :: record
     type(error_list_t), intent(inout) :: errors
-    type(state_frame_t) :: source
 
-    source%model => model
-    source%state => state
-    call write_failed_frame(record%result, clock%step, clock%time(), &
-      strain_at(model, state, clock%time()), source, errors)
+    call write_failed_frame(record%result, moment_at(clock, model, state, ledger_t()), model, &
+      state, errors)
   end subroutine record_failure
-
-  !> Points of a frame.
-  pure integer function points_of_state(self) result(n)
-    class(state_frame_t), intent(in) :: self
-
-    n = size(self%model%body%points)
-  end function points_of_state
-
-  !> A field of a frame.
-  subroutine field_of_state(self, name, values)
-    class(state_frame_t), intent(in) :: self
-    character(*), intent(in)  :: name
-    real(wp),     intent(out), contiguous :: values(:, :)   !! (components,points)
-
-    call point_field(name, self%model, self%state, values)
-  end subroutine field_of_state
 
   !> Show where the run stands; axial stress and largest alpha are those of the last row.
   subroutine record_progress(model, state, schedule, clock, record, errors)
@@ -265,14 +203,16 @@ contains
     type(record_t),     intent(inout) :: record
     type(error_list_t), intent(inout) :: errors
     type(status_t) :: status
+    type(moment_t) :: moment
 
     status%step = clock%step
     status%steps = schedule%steps
     status%time = clock%time()
-    status%largest_alpha = record%seen%max_plastic_strain
+    status%largest_alpha = record%seen%value('max_plastic_strain')
     if (model%platens%axis > 0) then
       status%has_strain = .true.
-      status%strain = strain_at(model, state, status%time)
+      moment = moment_at(clock, model, state, record%moment%ledger)
+      status%strain = moment%strain
       status%axial_stress = &
         model%boundaries(model%platens%first)%force(model%platens%axis) / model%platens%width
     end if
@@ -288,16 +228,21 @@ contains
     call say(record%progress, text, errors)
   end subroutine record_line
 
-  !> Write a checkpoint of the state after a step and its outputs.
+  !> Write a checkpoint of the state after a step, and before it the rows that it counts.
   subroutine save_checkpoint(model, state, ledger, clock, record, errors)
     type(model_t),      intent(in)    :: model
     type(state_t),      intent(in)    :: state
     type(ledger_t),     intent(in)    :: ledger
     type(clock_t),      intent(in)    :: clock
-    type(record_t),     intent(in)    :: record
+    type(record_t),     intent(inout) :: record
     type(error_list_t), intent(inout) :: errors
     type(checkpoint_t) :: checkpoint
+    type(state_t)      :: kept
+    integer :: before
 
+    before = errors%count()
+    call write_rows(record%result, errors)
+    if (errors%count() > before) return
     checkpoint%clock = clock
     checkpoint%history_rows = record%history%rows
     checkpoint%frames_written = record%frames
@@ -308,16 +253,16 @@ contains
     checkpoint%ledger_blocks(:, 2) = ledger%damping
     checkpoint%ledger_blocks(:, 3) = ledger%frame_work
     checkpoint%input = record%values
-    associate (body => model%body, places => model%body%points)
-      checkpoint%position = body%position(places, :)
-      checkpoint%volume = body%volume(places)
-      checkpoint%boundary = body%boundary(places)
-      call write_checkpoint(record%stem, checkpoint, state%gathered(places), errors)
-    end associate
+    checkpoint%position = model%body%position
+    checkpoint%volume = model%body%volume
+    checkpoint%boundary = model%body%boundary
+    kept = state
+    call kept%gather(model%operators%storage%row)
+    call write_checkpoint(record%stem, checkpoint, kept, errors)
   end subroutine save_checkpoint
 
-  !> Read the newest checkpoint and compare its input with the present one. The state has the points
-  !> of the body, without voids.
+  !> Read the newest checkpoint and compare its input with the present one. The state has one row per
+  !> point.
   !>
   !> Errors, `file_errors`: no checkpoint that can be read; `input_errors`: values that differ.
   subroutine load_checkpoint(input, checkpoint, state, ledger, warning, file_errors, input_errors)
@@ -350,10 +295,10 @@ contains
     type(checkpoint_t), intent(in) :: checkpoint
     type(body_t),       intent(in) :: body
 
-    same = size(checkpoint%volume) == size(body%points)
-    if (same) same = all(abs(checkpoint%position - body%position(body%points, :)) <= 0.0_wp) &
-      .and. all(abs(checkpoint%volume - body%volume(body%points)) <= 0.0_wp) &
-      .and. all(checkpoint%boundary == body%boundary(body%points))
+    same = size(checkpoint%volume) == body%n
+    if (same) same = all(abs(checkpoint%position - body%position) <= 0.0_wp) &
+      .and. all(abs(checkpoint%volume - body%volume) <= 0.0_wp) &
+      .and. all(checkpoint%boundary == body%boundary)
   end function same_points
 
 end module pd_record

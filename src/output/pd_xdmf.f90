@@ -2,26 +2,17 @@
 !>
 !> It holds no numbers, only where they lie in the HDF5 file, named without a folder so that both
 !> can be moved together. Vectors in the plane get a third component 0, which ParaView's filters
-!> (warp, glyph) ask for; tensors become one scalar a component.
+!> (warp, glyph) ask for; tensors become one scalar per component.
 module pd_xdmf
   use pd_errors, only: error_list_t
   use pd_files, only: write_whole_file
   use pd_kinds, only: wp
+  use pd_labels, only: field_label_t
   use pd_text, only: integer_text
   implicit none
   private
 
-  public :: field_t, xdmf_grid, write_xdmf
-
-  !> A field over the points, as the frames of a result file hold it.
-  type :: field_t
-    character(16)  :: name
-    character(4)   :: unit
-    integer        :: width         !! number of components
-    character(12)  :: components    !! their names, blank between; '' where there is one
-    character(120) :: description
-  end type field_t
-
+  public :: xdmf_grid, write_xdmf
 
   character(*), parameter :: nl = new_line('a')
 
@@ -43,7 +34,7 @@ contains
   pure function xdmf_grid(data_file, n, fields, index_of_frame, at_time, yields) result(text)
     character(*),  intent(in) :: data_file        !! name of the HDF5 file, without its folder
     integer,       intent(in) :: n                !! number of points
-    type(field_t), intent(in) :: fields(:)
+    type(field_label_t), intent(in) :: fields(:)
     integer,       intent(in) :: index_of_frame   !! k of /frames/k, written with six digits
     real(wp),      intent(in) :: at_time          !! [s]
     logical,       intent(in) :: yields           !! the points have a yield stress
@@ -74,28 +65,23 @@ contains
   pure function field_text(source, n, field) result(text)
     character(*),  intent(in) :: source
     integer,       intent(in) :: n
-    type(field_t), intent(in) :: field
-    character(:), allocatable :: text, rest
-    integer :: c, blank
+    type(field_label_t), intent(in) :: field
+    character(:), allocatable :: text
+    integer :: c
 
-    select case (field%width)
-    case (1)
+    if (field%width() == 1) then
       text = attribute(trim(field%name), 'Scalar', whole_item(source, integer_text(n), 'Float', 8))
-    case (2)
+    else if (field%width() == 2) then
       text = attribute(trim(field%name), 'Vector', '<DataItem ItemType="Function" ' &
         //'Function="JOIN($0, $1, 0 * $1)" Dimensions="'//integer_text(n)//' 3">'//nl &
-        //column_item(source, n, field%width, 1)//column_item(source, n, field%width, 2) &
-        //'</DataItem>'//nl)
-    case default
+        //column_item(source, n, 2, 1)//column_item(source, n, 2, 2)//'</DataItem>'//nl)
+    else
       text = ''
-      rest = field%components
-      do c = 1, field%width
-        blank = index(rest, ' ')
-        text = text//attribute(trim(field%name)//'_'//rest(:blank - 1), 'Scalar', &
-          column_item(source, n, field%width, c))
-        rest = rest(blank + 1:)//' '
+      do c = 1, field%width()
+        text = text//attribute(trim(field%name)//'_'//field%component(c), 'Scalar', &
+          column_item(source, n, field%width(), c))
       end do
-    end select
+    end if
   end function field_text
 
   pure function attribute(name, kind_of_field, item) result(text)
@@ -131,20 +117,17 @@ contains
   pure function escaped(name) result(text)
     character(*), intent(in) :: name
     character(:), allocatable :: text
-    integer :: i
+    character(5), parameter :: entities(3) = ['&amp;', '&lt; ', '&gt; ']
+    integer :: i, k
 
     text = ''
     do i = 1, len(name)
-      select case (name(i:i))
-      case ('&')
-        text = text//'&amp;'
-      case ('<')
-        text = text//'&lt;'
-      case ('>')
-        text = text//'&gt;'
-      case default
+      k = index('&<>', name(i:i))
+      if (k > 0) then
+        text = text//trim(entities(k))
+      else
         text = text//name(i:i)
-      end select
+      end if
     end do
   end function escaped
 

@@ -3,7 +3,9 @@
 import re
 from pathlib import Path
 
+import h5py
 import pytest
+from case_files import SPECIMEN
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCUMENTS = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "doc").glob("*.md"))]
@@ -75,24 +77,30 @@ def test_sections_of_the_theory_that_the_sources_name_exist():
             assert set(re.findall(r"\d+", reference)) <= sections, path.name
 
 
-def test_the_results_page_lists_every_column_and_field():
+@pytest.fixture(scope="module")
+def result(run_case, tmp_path_factory):
+    """Return the result file of a small run, which knows what it holds."""
+    folder = tmp_path_factory.mktemp("documents")
+    done = run_case(SPECIMEN, folder, "--quiet")
+    assert done.returncode == 0, done.stderr
+    return folder / "out" / "case.h5"
+
+
+def test_the_results_page_lists_every_column_and_field(result):
     page = (ROOT / "doc" / "results.md").read_text()
-    history = (ROOT / "src" / "output" / "pd_history.f90").read_text()
-    header = re.search(r"function header\b.*?end function", history, re.S).group()
-    words = re.findall(r"\w+", " ".join(re.findall(r"'([^']+)'", header)))
-    frames = (ROOT / "src" / "output" / "pd_frames.f90").read_text()
-    fields = re.findall(r"field_t\('(\w+)'", frames)
-    assert len(words) > 12
-    assert len(fields) > 5
-    columns = [f"<boundary>{word}" if word[0] == "_" else word for word in words]
+    with h5py.File(result, locking=False) as file:
+        columns = [re.sub("^(top|bottom)_", "<boundary>_", name) for name in file["history"]]
+        fields = [*file["frames/000000"], *(f"/points/{name}" for name in file["points"])]
+    assert len(columns) > 15
+    assert len(fields) > 10
     assert not [name for name in [*columns, *fields] if f"`{name}`" not in page]
 
 
-def test_the_results_page_lists_every_attribute_of_the_file():
+def test_the_results_page_lists_every_attribute_of_the_file(result):
     page = (ROOT / "doc" / "results.md").read_text()
-    source = (ROOT / "src" / "output" / "pd_result.f90").read_text()
-    attributes = re.findall(r"write_attribute\(file, '/', '(\w+)'", source)
-    assert len(attributes) > 10
+    with h5py.File(result, locking=False) as file:
+        attributes = [*file.attrs, *file["history"].attrs, *file["frames/000000"].attrs]
+    assert len(attributes) > 20
     assert not [name for name in attributes if f"`{name}`" not in page]
 
 

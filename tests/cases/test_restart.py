@@ -57,6 +57,26 @@ def assert_same(folder, straight):
     ):
         assert one.attrs["complete"] == 1
         same_points_and_frames(one, other)
+        same_history(one, other)
+
+
+def same_history(one, other):
+    """Assert that two results hold the same history, every row of it."""
+    assert dict(one["history"].attrs) == dict(other["history"].attrs)
+    assert set(one["history"]) == set(other["history"])
+    for name, data in other["history"].items():
+        assert (one["history"][name][()] == data[()]).all(), name
+
+
+def stored_rows(folder):
+    """Return how many rows the result holds; assert that the CSV file has the same ones."""
+    with h5py.File(folder / "case.h5", locking=False) as file:
+        n = int(file["history"].attrs["written"])
+        lines = (folder / "case_history.csv").read_text().splitlines()[: n + 1]
+        rows = [[float(cell) for cell in line.split(",")] for line in lines[1:]]
+        for k, name in enumerate(lines[0].split(",")):
+            assert list(file["history"][name][:n]) == [row[k] for row in rows], name
+    return n
 
 
 @pytest.mark.parametrize(("number", "status"), [(signal.SIGTERM, 143), (signal.SIGINT, 130)])
@@ -68,6 +88,7 @@ def test_a_run_that_was_stopped_goes_on_as_if_it_were_not(
     assert (tmp_path / "out" / "case_checkpoint.h5").exists()
     rows = history(tmp_path / "out" / "case_history.csv")
     assert len(rows["step"]) < 401
+    assert stored_rows(tmp_path / "out") == len(rows["step"])
     with h5py.File(tmp_path / "out" / "case.h5", locking=False) as file:
         assert file.attrs["complete"] == 0
     done = run_case(LONG, tmp_path, "--restart", "--quiet")
@@ -98,9 +119,18 @@ def test_a_run_that_was_killed_goes_on_from_its_last_checkpoint(
         assert file["frames/000000/displacement"].shape == file["points/position"].shape
         for frame in file["frames"].values():
             assert frame["stress"].shape[1] == 4
+    # a bunch is 50 rows
+    lines = (tmp_path / "out" / "case_history.csv").read_bytes().count(b"\n")
+    assert lines - 1 - 50 < stored_rows(tmp_path / "out") <= lines - 1
     done = run_case(LONG, tmp_path, "--restart", "--quiet")
     assert done.returncode == 0, done.stderr
     assert_same(tmp_path / "out", straight)
+
+
+def test_a_run_killed_between_checkpoints_keeps_the_rows_of_full_bunches(program, tmp_path):
+    process = begin(program, tmp_path, LONG.replace("frame_count = 20", "frame_count = 1"))
+    assert stop(process, signal.SIGKILL, tmp_path, 130) == -9
+    assert stored_rows(tmp_path / "out") >= 100
 
 
 def test_a_spoilt_checkpoint_is_passed_over(program, run_case, tmp_path, straight):

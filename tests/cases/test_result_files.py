@@ -1,5 +1,7 @@
 """The result files as other programs see them: HDF5 with units, XDMF in a VTK reader."""
 
+import re
+
 import h5py
 import numpy as np
 import pytest
@@ -52,6 +54,50 @@ def test_every_data_set_has_a_unit_and_a_description(results):
 
         file.visititems(look)
         assert lacking == []
+
+
+# Units of the columns by how their names begin or end; a column that none fits is an error.
+UNITS = (
+    (r"time$", "s"),
+    (r"\w+_force_[xy]$", "N/m"),
+    (r"mean_stress_", "Pa"),
+    (r"\w+_(energy|dissipation|work)$", "J/m"),
+    (r"(step|strain|mean_strain_yy|max_plastic_strain|energy_error)$", "1"),
+)
+
+
+def test_the_history_is_in_the_result_too(results):
+    rows = history(results / "case_history.csv")
+    with h5py.File(results / "case.h5", locking=False) as file:
+        assert file.attrs["schema_version"] == 2
+        stored = file["history"]
+        assert text(stored.attrs["columns"]).split() == list(rows)
+        assert set(stored) == set(rows)
+        assert stored.attrs["written"] == stored.attrs["rows"] == len(rows["step"])
+        for name, data in stored.items():
+            assert data.dtype == ("<i4" if name == "step" else "<f8"), name
+            assert data.chunks is None
+            assert (data[()] == rows[name]).all(), name
+            expected = next(unit for pattern, unit in UNITS if re.match(pattern, name))
+            assert text(data.attrs["unit"]) == expected, name
+            assert len(text(data.attrs["description"])) > 5
+
+
+def test_a_failed_run_has_its_good_rows_in_the_result(run_case, tmp_path):
+    check = run_case(SPECIMEN, tmp_path, "--check")
+    limit = float(check.stdout.split("2/omega_max = ")[1].split()[0])
+    step = f"end_time = 1.0, time_step_rule = 'fixed', time_step = {1.3 * limit}"
+    text = SPECIMEN.replace("final_strain = 0.01", step)
+    text = text.replace("frame_strains = 0.004, 0.01, history_count = 100", "history_count = 1000")
+    assert run_case(text, tmp_path, "--quiet").returncode == 4
+    rows = history(tmp_path / "out" / "case_history.csv")
+    assert len(rows["step"]) > 1
+    with h5py.File(tmp_path / "out" / "case.h5", locking=False) as file:
+        assert file.attrs["complete"] == 0
+        n = file["history"].attrs["written"]
+        assert n == len(rows["step"]) < file["history"].attrs["rows"]
+        for name, values in rows.items():
+            assert (file["history"][name][:n] == values).all(), name
 
 
 def test_the_input_stands_in_the_result_byte_for_byte(results):

@@ -1,0 +1,70 @@
+!> Answers without a run: --help, --version, --input-reference, --check.
+module pd_check
+  use, intrinsic :: iso_fortran_env, only: output_unit
+  use omp_lib, only: omp_get_max_threads
+  use pd_command_line, only: options_t, print_help
+  use pd_errors, only: exit_ok, outcome_t
+  use pd_input_reference, only: write_input_reference
+  use pd_kinds, only: wp
+  use pd_run, only: run_t
+  use pd_stability, only: find_highest_frequency
+  use pd_summary, only: estimated_seconds, summarise, summary_t
+  use pd_version, only: code_version, git_hash
+  implicit none
+  private
+
+  public :: answer_questions, print_check
+
+contains
+
+  !> Answer what needs no input; the program then ends.
+  subroutine answer_questions(options, outcome)
+    type(options_t), intent(in)    :: options
+    type(outcome_t), intent(inout) :: outcome
+
+    if (options%help) call print_help()
+    if (options%version) write (output_unit, '(a)') 'perigeo '//code_version//' ('//git_hash//')'
+    if (options%input_reference) call write_input_reference(output_unit)
+    if (options%help .or. options%version .or. options%input_reference) &
+      call outcome%end_with(exit_ok)
+  end subroutine answer_questions
+
+  !> Print the derived figures of a run that is set up; the program then ends.
+  subroutine print_check(path, run, outcome)
+    character(*),    intent(in)    :: path      !! of the input file
+    type(run_t),     intent(inout) :: run
+    type(outcome_t), intent(inout) :: outcome
+    type(summary_t) :: summary
+    integer :: i
+
+    call find_highest_frequency(run%model)
+    if (run%clock%time_step * run%model%highest_frequency > 2.0_wp) call run%warnings%add( &
+      'the time step is larger than the stable one: the run will not last', '&integration')
+    summary = summarise(run%input, run%model, run%clock, run%schedule)
+    write (output_unit, '(a)') path//': the input is right'
+    do i = 1, size(summary%lines)
+      write (output_unit, '(a)') trim(summary%lines(i))
+    end do
+    call print_estimate(estimated_seconds(run%model, run%schedule))
+    call run%warnings%print(output_unit, 'warning')
+    call outcome%end_with(exit_ok)
+  end subroutine print_check
+
+  !> Last line of --check.
+  subroutine print_estimate(seconds)
+    real(wp), intent(in) :: seconds
+    character(16) :: text, threads
+
+    write (threads, '(i0)') omp_get_max_threads()
+    if (seconds < 100.0_wp) then
+      write (text, '(f12.1,a)') max(0.1_wp, seconds), ' s'
+    else if (seconds < 6000.0_wp) then
+      write (text, '(f12.1,a)') seconds / 60.0_wp, ' min'
+    else
+      write (text, '(f12.1,a)') seconds / 3600.0_wp, ' h'
+    end if
+    write (output_unit, '(a)') '  run time            about '//trim(adjustl(text))// &
+      ', threads: '//trim(threads)
+  end subroutine print_estimate
+
+end module pd_check

@@ -1,0 +1,175 @@
+!> A run: everything that it consists of, and how it begins.
+module pd_run
+  use, intrinsic :: iso_fortran_env, only: int64
+  use omp_lib, only: omp_get_max_threads
+  use pd_boundary, only: boundary_forces
+  use pd_checkpoint, only: checkpoint_t
+  use pd_clock, only: clock_t
+  use pd_command_line, only: options_t
+  use pd_errors, only: error_list_t, exit_file, exit_input, exit_model, outcome_t
+  use pd_history_columns, only: history_columns
+  use pd_input, only: read_input
+  use pd_input_types, only: input_t
+  use pd_ledger, only: ledger_t, new_ledger
+  use pd_model, only: model_t, start
+  use pd_observe, only: column_t, moment_at, observation_t, observe
+  use pd_record, only: load_checkpoint, observe_state, open_record, record_frame, record_line, &
+    record_progress, record_row, record_t, results_in_the_way, same_points
+  use pd_schedule, only: schedule_t
+  use pd_setup, only: set_up_model
+  use pd_setup_body, only: set_up_body
+  use pd_setup_schedule, only: set_up_schedule
+  use pd_state, only: state_t
+  use pd_step, only: step_work_t
+  use pd_summary, only: summarise, summary_t
+  use pd_timing, only: timing_t
+  use pd_version, only: code_version, git_hash
+  implicit none
+  private
+
+  public :: run_t, set_up_run, open_outputs
+
+  type :: run_t
+    type(input_t)      :: input
+    type(model_t)      :: model
+    type(schedule_t)   :: schedule
+    type(clock_t)      :: clock
+    type(state_t)      :: state
+    type(ledger_t)     :: ledger
+    type(step_work_t)  :: work
+    type(record_t)     :: record
+    type(timing_t)     :: timing
+    type(checkpoint_t) :: checkpoint          !! that it goes on from; no rows: a new run
+    type(error_list_t) :: warnings
+    integer(int64) :: last_checkpoint = 0     !! count of the system clock
+    integer(int64) :: loop_start = 0          !! count of the system clock
+  end type run_t
+
+contains
+
+  !> Input, body, model, time step, and the state to begin with: unloaded, or of a checkpoint.
+  subroutine set_up_run(options, run, outcome)
+    type(options_t), intent(in)    :: options
+    type(run_t),     intent(inout) :: run
+    type(outcome_t), intent(inout) :: outcome
+    type(error_list_t) :: errors, input_errors
+
+    call read_input(options%input_path, run%input, errors)
+    call outcome%end_if_any(errors, exit_input)
+    if (outcome%done) return
+    if (options%output_dir /= '') run%input%run%output_dir = options%output_dir
+    if (.not. options%check) call look_for_earlier_run(options, run, outcome)
+    if (outcome%done) return
+
+    call set_up_body(run%input, run%model%body, run%warnings, input_errors, errors)
+    call outcome%end_if_any(input_errors, exit_input)
+    call outcome%end_if_any(errors, exit_model)
+    if (outcome%done) return
+    if (run%checkpoint%history_rows > 0) then
+      if (.not. same_points(run%checkpoint, run%model%body)) &
+        call errors%add('the points are not those of the checkpoint', run%input%path)
+      call outcome%end_if_any(errors, exit_input)
+      if (outcome%done) return
+    end if
+    call set_up_model(run%input, run%model, errors)
+    call outcome%end_if_any(errors, exit_model)
+    if (outcome%done) return
+    run%clock = run%checkpoint%clock
+    call set_up_schedule(run%input, run%clock, run%model, run%schedule, errors)
+    call outcome%end_if_any(errors, exit_input)
+    if (.not. outcome%done .and. .not. options%check) call begin_state(run)
+  end subroutine set_up_run
+
+  !> Results of an earlier run are overwritten or continued only on request; a checkpoint is read
+  !> where the run goes on from it.
+  subroutine look_for_earlier_run(options, run, outcome)
+    type(options_t), intent(in)    :: options
+    type(run_t),     intent(inout) :: run
+    type(outcome_t), intent(inout) :: outcome
+    type(error_list_t) :: errors, input_errors
+    character(:), allocatable :: stem, warning
+
+    stem = run%input%run%output_dir//'/'//run%input%run%name
+    if (options%restart) then
+      call load_checkpoint(run%input, run%checkpoint, run%state, run%ledger, warning, errors, &
+        input_errors)
+      call outcome%end_if_any(errors, exit_file)
+      call outcome%end_if_any(input_errors, exit_input)
+      if (outcome%done) return
+      if (warning /= '') call run%warnings%add(warning)
+    else if (.not. options%force) then
+      if (results_in_the_way(stem)) call errors%add('there are results of an earlier run; '// &
+        '--force overwrites them, --restart goes on from a checkpoint, --output DIR writes '// &
+        'elsewhere', stem)
+      call outcome%end_if_any(errors, exit_file)
+    end if
+  end subroutine look_for_earlier_run
+
+  !> The unloaded state, or that of the checkpoint.
+  subroutine begin_state(run)
+    type(run_t), intent(inout) :: run
+    type(column_t), allocatable :: columns(:)
+    type(observation_t) :: seen
+
+    associate (model => run%model, state => run%state, ledger => run%ledger)
+      if (run%checkpoint%history_rows > 0) then
+        state%remembered = model%materials%remembered()
+        call state%scatter(model%operators%storage%row, model%operators%n)
+        state%strength = model%strength
+        call ledger%fit(model%blocks)
+        call model%operators%take_in(state%displacement)
+        call boundary_forces(model%points%position, model%points%volume, run%clock%time(), &
+          state%force, model%boundaries)
+      else
+        call start(model, state)
+        ledger = new_ledger(model%blocks)
+        call history_columns(model, columns)
+        call observe(columns, model, state, moment_at(run%clock, model, state, ledger), seen)
+        ledger%initial_kinetic_energy = seen%value('kinetic_energy')
+        run%checkpoint%clock = run%clock
+      end if
+    end associate
+  end subroutine begin_state
+
+  !> Open all files; the unloaded state is the first row and the first frame.
+  subroutine open_outputs(options, run, outcome)
+    type(options_t), intent(in)    :: options
+    type(run_t),     intent(inout) :: run
+    type(outcome_t), intent(inout) :: outcome
+    type(error_list_t) :: errors
+    type(summary_t)    :: summary
+    character(:), allocatable :: command
+    integer :: length, i
+
+    call get_command(length=length)
+    allocate (character(length) :: command)
+    call get_command(command)
+    call open_record(run%input, command, omp_get_max_threads(), run%model, run%schedule, &
+      run%checkpoint, options%quiet, run%record, errors)
+    call outcome%end_if_any(errors, exit_file)
+    if (outcome%done) return
+    associate (record => run%record)
+      call record_line(record, 'perigeo '//code_version//' ('//git_hash//'), '// &
+        options%input_path, errors)
+      summary = summarise(run%input, run%model, run%clock, run%schedule)
+      do i = 1, size(summary%lines)
+        call record_line(record, trim(summary%lines(i)), errors)
+      end do
+      do i = 1, run%warnings%count()
+        call record_line(record, 'warning: '//run%warnings%message(i), errors)
+      end do
+      call observe_state(run%model, run%state, run%ledger, run%clock, record)
+      if (run%checkpoint%history_rows == 0) then
+        call record_row(record, errors)
+        if (errors%count() == 0) call record_frame(run%model, run%state, record, errors)
+      else
+        call record_line(record, 'going on from a checkpoint', errors)
+      end if
+      call record_progress(run%model, run%state, run%schedule, run%clock, record, errors)
+    end associate
+    call outcome%end_if_any(errors, exit_file)
+    call system_clock(run%last_checkpoint)
+    run%loop_start = run%last_checkpoint
+  end subroutine open_outputs
+
+end module pd_run

@@ -1,0 +1,162 @@
+!> What happens around the steps of a run: what is due is written, and a run ends well, fails, or is
+!> stopped by a signal.
+module pd_run_steps
+  use, intrinsic :: iso_fortran_env, only: error_unit, int64
+  use pd_errors, only: error_list_t, exit_calculation, exit_file, exit_interrupted, &
+    exit_terminated, outcome_t
+  use pd_kinds, only: wp
+  use pd_observe, only: running_away
+  use pd_progress, only: progress_due
+  use pd_record, only: close_record, observe_state, record_failure, record_frame, record_line, &
+    record_progress, record_row, save_checkpoint
+  use pd_run, only: run_t
+  use pd_schedule, only: row_due
+  use pd_system, only: pending_signal, sigint
+  use pd_timing, only: kernel_history, kernel_names
+  implicit none
+  private
+
+  public :: due_t, due_after_next_step, write_what_is_due, finish_run
+
+  !> What is written after a step. Known before it: only then has its state to be whole.
+  type :: due_t
+    logical :: row = .false., frame = .false., checkpoint = .false.
+    logical :: stop = .false.      !! a signal came
+    logical :: anything = .false.  !! the state will be looked at
+  end type due_t
+
+contains
+
+  !> What is due after the next step. A signal that comes during a step is met after the one behind
+  !> it.
+  type(due_t) function due_after_next_step(run) result(due)
+    type(run_t), intent(in) :: run
+    integer(int64) :: now, rate
+    integer :: step
+
+    step = run%clock%step + 1
+    due%row = row_due(run%schedule, step)
+    due%frame = any(run%schedule%frame_steps == step)
+    due%stop = pending_signal() /= 0
+    due%checkpoint = due%stop
+    associate (every => run%input%output%checkpoint_every)
+      if (every > 0.0_wp) then
+        call system_clock(now, rate)
+        due%checkpoint = due%checkpoint .or. step == run%schedule%steps .or. &
+          real(now - run%last_checkpoint, wp) >= every * real(rate, wp)
+      end if
+    end associate
+    due%anything = due%row .or. due%frame .or. due%checkpoint
+  end function due_after_next_step
+
+  !> Write what is due. Before anything of a state is kept it is looked at: a run that gains energy
+  !> has failed.
+  !>
+  !> `failed_row`: of the step, see `take_step`.
+  subroutine write_what_is_due(due, failed_row, run, outcome)
+    type(due_t),     intent(in)    :: due
+    integer,         intent(in)    :: failed_row
+    type(run_t),     intent(inout) :: run
+    type(outcome_t), intent(inout) :: outcome
+    type(error_list_t) :: errors
+
+    if (failed_row > 0) call fail('det F is not positive, or not a number', failed_row, run, outcome)
+    if (outcome%done) return
+    if (due%anything) then
+      call run%ledger%note_work(run%model%blocks)
+      call observe_state(run%model, run%state, run%ledger, run%clock, run%record)
+      ! After the first step from rest loads have given half a kick, and no work has been done yet.
+      if (run%clock%step > 1 .and. running_away(run%record%seen, run%ledger)) &
+        call fail('the energy runs away', fastest_row(run), run, outcome)
+      if (outcome%done) return
+    end if
+    if (due%row) call record_row(run%record, errors)
+    if (progress_due(run%record%progress, run%clock%step, run%schedule%steps)) &
+      call record_progress(run%model, run%state, run%schedule, run%clock, run%record, errors)
+    call run%timing%lap(kernel_history)
+    call write_frames_and_checkpoint(due, run, errors)
+    if (due%stop .and. errors%count() == 0) call record_line(run%record, &
+      'stopped by a signal; --restart goes on from the checkpoint', errors)
+    call outcome%end_if_any(errors, exit_file)
+    if (due%stop .and. .not. outcome%done) &
+      call outcome%end_with(merge(exit_interrupted, exit_terminated, pending_signal() == sigint))
+  end subroutine write_what_is_due
+
+  !> As many frames as are asked for at this step, and a checkpoint.
+  subroutine write_frames_and_checkpoint(due, run, errors)
+    type(due_t),        intent(in)    :: due
+    type(run_t),        intent(inout) :: run
+    type(error_list_t), intent(inout) :: errors
+    integer :: k
+
+    do k = 1, merge(count(run%schedule%frame_steps == run%clock%step), 0, due%frame)
+      call record_frame(run%model, run%state, run%record, errors)
+    end do
+    if (.not. due%checkpoint) return
+    call save_checkpoint(run%model, run%state, run%ledger, run%clock, run%record, errors)
+    call system_clock(run%last_checkpoint)
+  end subroutine write_frames_and_checkpoint
+
+  !> Where a run that runs away moves fastest, of the points that move freely.
+  pure integer function fastest_row(run)
+    type(run_t), intent(in) :: run
+
+    fastest_row = maxloc(sum((run%model%points%free * run%state%velocity)**2, dim=2), dim=1)
+  end function fastest_row
+
+  !> The calculation has failed: keep the failing state apart from the good frames, and say where.
+  subroutine fail(reason, row, run, outcome)
+    character(*),    intent(in)    :: reason
+    integer,         intent(in)    :: row
+    type(run_t),     intent(inout) :: run
+    type(outcome_t), intent(inout) :: outcome
+    type(error_list_t) :: errors, file_errors
+    character(160) :: where
+
+    associate (x => run%model%points%position)
+      write (where, '(a,i0,a,es12.5,a,i0,a,g0.7,a,g0.7,a)') 'step ', run%clock%step, ', time ', &
+        run%clock%time(), ' s, point ', run%model%operators%storage%point_at(row), ' at (', &
+        x(row, 1), ', ', x(row, 2), ') m'
+    end associate
+    call record_failure(run%model, run%state, run%clock, run%record, file_errors)
+    call record_line(run%record, 'the calculation failed: '//reason//'; '//trim(where), file_errors)
+    call file_errors%print(error_unit)
+    call errors%add('the calculation failed: '//reason//'; the frames and rows before this '// &
+      'step are good; a smaller safety or time step may help', trim(where))
+    call outcome%end_if_any(errors, exit_calculation)
+  end subroutine fail
+
+  !> The end of a run that has reached its end.
+  subroutine finish_run(run, outcome)
+    type(run_t),     intent(inout) :: run
+    type(outcome_t), intent(inout) :: outcome
+    type(error_list_t) :: errors
+
+    call tell_where_time_went(run, errors)
+    call record_line(run%record, 'results in '//run%record%stem//'.h5, .xdmf, _history.csv', errors)
+    call close_record(run%record, errors)
+    call outcome%end_if_any(errors, exit_file)
+  end subroutine finish_run
+
+  !> Last lines of the log: seconds of the time loop and of its kernels; the rest is frames and
+  !> checkpoints.
+  subroutine tell_where_time_went(run, errors)
+    type(run_t),        intent(inout) :: run
+    type(error_list_t), intent(inout) :: errors
+    integer(int64) :: now, rate
+    character(256) :: line
+    real(wp) :: whole
+    integer  :: k
+
+    call system_clock(now, rate)
+    whole = real(now - run%loop_start, wp) / real(rate, wp)
+    write (line, '(a,f10.3,a,i0)') 'time loop ', whole, ' s, steps ', &
+      run%schedule%steps - run%checkpoint%clock%step
+    call record_line(run%record, trim(line), errors)
+    write (line, '(a,9(2x,a,f9.3))') 'kernels [s] ', &
+      (trim(kernel_names(k)), run%timing%seconds(k), k=1, size(kernel_names)), 'frames', &
+      max(0.0_wp, whole - sum(run%timing%seconds))
+    call record_line(run%record, trim(line), errors)
+  end subroutine tell_where_time_went
+
+end module pd_run_steps

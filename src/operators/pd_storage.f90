@@ -1,0 +1,110 @@
+!> Where the points of a body stand in the fields.
+!>
+!> Points are numbered 1 to n for everybody. Fields have rows: one per point where bonds are listed;
+!> on a lattice also one for every place of the box that holds no point, so that the bond to a
+!> neighbour is a shift, the same for all. Kernels go over rows, and what is asked of points is
+!> translated here.
+module pd_storage
+  use pd_families, only: horizon_t
+  use pd_kinds, only: n_line, wp
+  implicit none
+  private
+
+  public :: storage_t, listed_storage, lattice_storage
+
+  type :: storage_t
+    integer :: n = 0                       !! points
+    integer :: rows = 0                    !! of every field
+    integer :: stride = 0                  !! rows from a row of the lattice to the next; 0: a list
+    integer, allocatable :: row(:)         !! of every point, ascending (n)
+  contains
+    procedure, private :: spread_values
+    procedure, private :: spread_tensors
+    procedure, private :: spread_numbers
+    generic :: spread => spread_values, spread_tensors, spread_numbers
+    procedure :: point_at
+  end type storage_t
+
+contains
+
+  !> A row for every point.
+  pure type(storage_t) function listed_storage(n) result(storage)
+    integer, intent(in) :: n
+    integer :: i
+
+    storage%n = n
+    storage%rows = n
+    allocate (storage%row(n))
+    storage%row = [(i, i=1, n)]
+  end function listed_storage
+
+  !> Rows for the box of places around the points of a lattice, row by row, with a margin, so that a
+  !> shift by a horizon never leaves the fields.
+  pure type(storage_t) function lattice_storage(horizon, spacing, place) result(storage)
+    type(horizon_t), intent(in) :: horizon
+    real(wp),        intent(in) :: spacing       !! dx [m]
+    integer,         intent(in) :: place(:, :)   !! column and row of every point (n,2)
+    integer :: low(2), high(2), margin, reach
+
+    reach = ceiling(horizon%delta / spacing - 1.0e-6_wp)
+    low = minval(place, dim=1)
+    high = maxval(place, dim=1)
+    margin = whole_lines(reach)
+    storage%n = size(place, 1)
+    storage%stride = whole_lines(high(1) - low(1) + 1 + reach)
+    storage%rows = storage%stride * (high(2) - low(2) + 1 + 2 * reach) + 2 * margin
+    allocate (storage%row(storage%n))
+    storage%row = margin + 1 + place(:, 1) - low(1) + storage%stride * (place(:, 2) - low(2) + reach)
+  end function lattice_storage
+
+  !> Places in as many whole lines of the cache as hold a number of them.
+  pure integer function whole_lines(count) result(places)
+    integer, intent(in) :: count
+
+    places = n_line * ((count + n_line - 1) / n_line)
+  end function whole_lines
+
+  !> A field of the points, in rows; 0 in the others.
+  pure function spread_values(self, values) result(field)
+    class(storage_t), intent(in) :: self
+    real(wp),         intent(in) :: values(:)   !! (n)
+    real(wp), allocatable :: field(:)           !! (rows)
+
+    allocate (field(self%rows), source=0.0_wp)
+    field(self%row) = values
+  end function spread_values
+
+  !> A field with components.
+  pure function spread_tensors(self, values) result(field)
+    class(storage_t), intent(in) :: self
+    real(wp),         intent(in) :: values(:, :)   !! (n, components)
+    real(wp), allocatable :: field(:, :)           !! (rows, components)
+
+    allocate (field(self%rows, size(values, 2)), source=0.0_wp)
+    field(self%row, :) = values
+  end function spread_tensors
+
+  !> A field of whole numbers; rows without a point have the number of the last point before them,
+  !> or of the first one.
+  pure function spread_numbers(self, values) result(field)
+    class(storage_t), intent(in) :: self
+    integer,          intent(in) :: values(:)   !! (n)
+    integer, allocatable :: field(:)            !! (rows)
+    integer :: k
+
+    allocate (field(self%rows), source=values(1))
+    do k = 1, self%n - 1
+      field(self%row(k):self%row(k + 1) - 1) = values(k)
+    end do
+    field(self%row(self%n):) = values(self%n)
+  end function spread_numbers
+
+  !> The point of a row; the one before it where the row holds none.
+  pure integer function point_at(self, row) result(point)
+    class(storage_t), intent(in) :: self
+    integer,          intent(in) :: row
+
+    point = count(self%row <= row)
+  end function point_at
+
+end module pd_storage

@@ -1,0 +1,198 @@
+!> The fields of a frame, in their order: what each is, in words and in numbers.
+!>
+!> This is the only list of them. Places in the result file, writing, taking over on a restart and
+!> the XDMF file loop over it; one more field is a procedure and a call here.
+!> Source: doc/theory.md, section 10.
+module pd_frame_fields
+  use pd_kinds, only: n_block, wp
+  use pd_labels, only: field_label_t
+  use pd_model, only: model_t
+  use pd_state, only: state_t
+  use pd_tensors, only: von_mises
+  implicit none
+  private
+
+  public :: points_view_t, frame_field_t, frame_fields, fill_field
+
+  !> What a field sees.
+  type :: points_view_t
+    type(model_t), pointer :: model => null()
+    type(state_t), pointer :: state => null()
+    integer :: column = 0   !! that the field is about
+  end type points_view_t
+
+  !> A field over the points.
+  type, extends(field_label_t) :: frame_field_t
+    procedure(field_of_points), pointer, nopass :: values => null()
+    integer :: column = 0   !! that it is about, if it is: fields that one procedure serves
+  end type frame_field_t
+
+  abstract interface
+    !> The values at the points of the body and of its layers, point by point as they go to the
+    !> file.
+    subroutine field_of_points(view, values)
+      import :: points_view_t, wp
+      type(points_view_t), intent(in)  :: view
+      real(wp),            intent(out), contiguous :: values(:, :)   !! (components,points)
+    end subroutine field_of_points
+  end interface
+
+contains
+
+  !> The fields of the frames of a run.
+  subroutine frame_fields(fields)
+    type(frame_field_t), allocatable, intent(out) :: fields(:)
+    character(*), parameter :: tensor = 'xx yy zz xy'
+
+    fields = [ &
+      frame_field_t('displacement', 'm', 'displacement from the reference position', 'x y', &
+      displacement), &
+      frame_field_t('velocity', 'm/s', 'velocity', 'x y', velocity), &
+      frame_field_t('stress', 'Pa', 'Cauchy stress, tension positive', tensor, stress), &
+      frame_field_t('strain', '1', 'strain in the measure of the material (xy: tensor '// &
+      'component)', tensor, strain), &
+      frame_field_t('plastic_strain', '1', 'equivalent plastic strain alpha', '', &
+      plastic_strain), &
+      frame_field_t('von_mises', 'Pa', 'equivalent stress sqrt(3/2) |deviator of the Cauchy '// &
+      'stress|', '', mises_stress), &
+      frame_field_t('zero_energy', '1', 'root mean square over the family of the part of the '// &
+      'deformation that F does not describe, divided by the horizon', '', zero_energy)]
+  end subroutine frame_fields
+
+  !> The values of a field at the points of the body and of its layers.
+  subroutine fill_field(field, model, state, values)
+    type(frame_field_t),   intent(in)  :: field
+    type(model_t), target, intent(in)  :: model
+    type(state_t), target, intent(in)  :: state
+    real(wp),              intent(out), contiguous :: values(:, :)   !! (components,points)
+    type(points_view_t) :: view
+
+    view%model => model
+    view%state => state
+    view%column = field%column
+    call field%values(view, values)
+  end subroutine fill_field
+
+  subroutine displacement(view, values)
+    type(points_view_t), intent(in)  :: view
+    real(wp),            intent(out), contiguous :: values(:, :)
+
+    call take(view%model, view%state%displacement, values)
+  end subroutine displacement
+
+  subroutine velocity(view, values)
+    type(points_view_t), intent(in)  :: view
+    real(wp),            intent(out), contiguous :: values(:, :)
+
+    call take(view%model, view%state%velocity, values)
+  end subroutine velocity
+
+  !> Cauchy stress; a point that has failed (det F <= 0) has none: 0.
+  subroutine stress(view, values)
+    type(points_view_t), intent(in)  :: view
+    real(wp),            intent(out), contiguous :: values(:, :)
+
+    call take(view%model, cauchy_stress(view), values)
+  end subroutine stress
+
+  subroutine mises_stress(view, values)
+    type(points_view_t), intent(in)  :: view
+    real(wp),            intent(out), contiguous :: values(:, :)
+    real(wp), allocatable :: sigma(:, :)
+    integer :: i
+
+    allocate (sigma(4, size(values, 2)))
+    call take(view%model, cauchy_stress(view), sigma)
+    do i = 1, size(values, 2)
+      values(1, i) = von_mises(sigma(:, i))
+    end do
+  end subroutine mises_stress
+
+  subroutine strain(view, values)
+    type(points_view_t), intent(in)  :: view
+    real(wp),            intent(out), contiguous :: values(:, :)
+    real(wp), allocatable :: rows(:, :)
+    real(wp) :: in_block(n_block, 4)
+    integer  :: block, lo, hi
+
+    associate (model => view%model, state => view%state)
+      allocate (rows(model%operators%n, 4), source=0.0_wp)
+      do block = 1, model%blocks%count
+        lo = model%blocks%lo(block)
+        hi = model%blocks%hi(block)
+        call model%materials%strain_block(block, state%displacement_gradient, in_block)
+        rows(lo:hi, :) = in_block(:hi - lo + 1, :)
+      end do
+      call take(model, rows, values)
+    end associate
+  end subroutine strain
+
+  subroutine plastic_strain(view, values)
+    type(points_view_t), intent(in)  :: view
+    real(wp),            intent(out), contiguous :: values(:, :)
+    real(wp), allocatable :: rows(:, :)
+    real(wp) :: in_block(n_block)
+    integer  :: block, lo, hi
+
+    associate (model => view%model, state => view%state)
+      allocate (rows(model%operators%n, 1), source=0.0_wp)
+      do block = 1, model%blocks%count
+        lo = model%blocks%lo(block)
+        hi = model%blocks%hi(block)
+        call model%materials%plastic_strain_block(block, state%law_points_t, in_block)
+        rows(lo:hi, 1) = in_block(:hi - lo + 1)
+      end do
+      call take(model, rows, values)
+    end associate
+  end subroutine plastic_strain
+
+  !> The rms of the zero-energy part of the deformation, weighted with omega V over the family, over
+  !> the horizon.
+  subroutine zero_energy(view, values)
+    type(points_view_t), intent(in)  :: view
+    real(wp),            intent(out), contiguous :: values(:, :)
+    real(wp), allocatable :: z2(:), rows(:, :)
+
+    associate (model => view%model, state => view%state)
+      allocate (z2(model%operators%n))
+      call model%operators%zero_energy_squared(state%displacement, state%displacement_gradient, z2)
+      rows = reshape(sqrt(z2 / model%operators%weight_sum) / model%delta, [size(z2), 1])
+      call take(model, rows, values)
+    end associate
+  end subroutine zero_energy
+
+  !> The values of a field of the state at the points.
+  subroutine take(model, field, values)
+    type(model_t), intent(in) :: model
+    real(wp), intent(in)  :: field(:, :)                    !! (rows,components)
+    real(wp), intent(out), contiguous :: values(:, :)       !! (components,points)
+    integer :: i
+
+    !$omp parallel do schedule(static) default(none) private(i) shared(model, values, field)
+    do i = 1, size(values, 2)
+      values(:, i) = field(model%operators%storage%row(i), :)
+    end do
+    !$omp end parallel do
+  end subroutine take
+
+  !> Cauchy stress in the rows of the fields; 0 where det F is not positive.
+  function cauchy_stress(view) result(rows)
+    type(points_view_t), intent(in) :: view
+    real(wp), allocatable :: rows(:, :)   !! xx yy zz xy [Pa]
+    real(wp) :: in_block(n_block, 4)
+    integer  :: block, lo, hi
+
+    allocate (rows(view%model%operators%n, 4), source=0.0_wp)
+    !$omp parallel do schedule(static) default(none) private(block, lo, hi, in_block) &
+    !$omp shared(view, rows)
+    do block = 1, view%model%blocks%count
+      lo = view%model%blocks%lo(block)
+      hi = view%model%blocks%hi(block)
+      call view%model%materials%cauchy_block(block, view%state%displacement_gradient, &
+        view%state%stress, in_block)
+      rows(lo:hi, :) = in_block(:hi - lo + 1, :)
+    end do
+    !$omp end parallel do
+  end function cauchy_stress
+
+end module pd_frame_fields

@@ -1,0 +1,217 @@
+!> The columns of the history, in their order: what each is, in words and in numbers.
+!>
+!> This is the only list of them. Observation, the CSV file, the result file and the tests of the
+!> documents loop over it; one more column is a procedure and a call here.
+!> Source: doc/theory.md, section 10.
+module pd_history_columns
+  use pd_kinds, only: block_dot, block_sum, n_block, wp
+  use pd_model, only: model_t
+  use pd_observe, only: block_view_t, column_t, largest, mean, row_view_t, surplus, total
+  implicit none
+  private
+
+  public :: history_columns
+
+contains
+
+  !> The columns of a run. Averages and extrema are over the body without fictitious points,
+  !> energies over all points.
+  subroutine history_columns(model, columns)
+    type(model_t),               intent(in)  :: model
+    type(column_t), allocatable, intent(out) :: columns(:)
+    character(*), parameter :: in_body = ' of the body without fictitious points'
+    integer :: k
+
+    allocate (columns(0))
+    call add(columns, column_t('step', '1', 'number of the step', whole_number=.true., &
+      value=step))
+    call add(columns, column_t('time', 's', 'step times time step', value=time))
+    if (model%platens%axis > 0) call add(columns, column_t('strain', '1', &
+      'nominal strain between the platens, compression positive', value=strain))
+    do k = 1, size(model%boundaries)
+      call add_force(columns, model%boundaries(k)%name, k)
+    end do
+    call add(columns, column_t('mean_stress_xx', 'Pa', 'mean first Piola-Kirchhoff stress P_xx'// &
+      in_body, joined=mean, part=stress_xx))
+    call add(columns, column_t('mean_stress_yy', 'Pa', 'mean first Piola-Kirchhoff stress P_yy'// &
+      in_body, joined=mean, part=stress_yy))
+    call add(columns, column_t('mean_strain_yy', '1', 'mean strain E_yy'//in_body, joined=mean, &
+      part=strain_yy))
+    call add(columns, column_t('max_plastic_strain', '1', 'largest equivalent plastic strain'// &
+      in_body, joined=largest, part=plastic_strain))
+    call add(columns, column_t('kinetic_energy', 'J/m', 'kinetic energy of all points', &
+      joined=total, part=kinetic_energy))
+    call add(columns, column_t('strain_energy', 'J/m', 'stored elastic energy of all points', &
+      joined=total, part=strain_energy))
+    call add(columns, column_t('plastic_dissipation', 'J/m', 'plastic work so far', &
+      value=plastic_dissipation))
+    call add(columns, column_t('damping_dissipation', 'J/m', 'work of the damping forces '// &
+      'against the frame of the damping so far', value=damping_dissipation))
+    call add(columns, column_t('stabilisation_energy', 'J/m', 'energy of the zero-energy '// &
+      'control; 0 without', value=stabilisation_energy))
+    call add(columns, column_t('external_work', 'J/m', 'work of prescribed motion, of loads, '// &
+      'and of the moving frame of the damping so far', value=external_work))
+    call add(columns, column_t('energy_error', '1', 'what the balance lacks, over the external '// &
+      'work or the initial kinetic energy', value=energy_error))
+  end subroutine history_columns
+
+  subroutine add(columns, column)
+    type(column_t), allocatable, intent(inout) :: columns(:)
+    type(column_t),              intent(in)    :: column
+
+    columns = [columns, column]
+  end subroutine add
+
+  !> Both components of the force of boundary k.
+  subroutine add_force(columns, name, k)
+    type(column_t), allocatable, intent(inout) :: columns(:)
+    character(*),                intent(in)    :: name
+    integer,                     intent(in)    :: k
+    character(1), parameter :: axes(2) = ['x', 'y']
+    integer :: c
+
+    do c = 1, 2
+      call add(columns, column_t(trim(name)//'_force_'//axes(c), 'N/m', axes(c)//'-component '// &
+        'of the force that the boundary '//trim(name)//' applies to the body', value=force, &
+        boundary=k, component=c))
+    end do
+  end subroutine add_force
+
+  ! ---- from the blocks ----------------------------------------------------------------------
+
+  pure real(wp) function stress_xx(block) result(part)
+    type(block_view_t), intent(in) :: block
+
+    part = block_dot(block%weight, block%p(:, 1))
+  end function stress_xx
+
+  pure real(wp) function stress_yy(block) result(part)
+    type(block_view_t), intent(in) :: block
+
+    part = block_dot(block%weight, block%p(:, 4))
+  end function stress_yy
+
+  pure real(wp) function strain_yy(block) result(part)
+    type(block_view_t), intent(in) :: block
+
+    part = block_dot(block%weight, block%strain(:, 2))
+  end function strain_yy
+
+  pure real(wp) function plastic_strain(block) result(part)
+    type(block_view_t), intent(in) :: block
+    real(wp) :: alpha(n_block)
+    integer  :: i
+
+    call block%model%materials%plastic_strain_block(block%number, block%state%law_points_t, alpha)
+    part = 0.0_wp
+    associate (in_body => block%model%points%in_body, lo => block%lo)
+      !$omp simd simdlen(8) reduction(max:part)
+      do i = lo, block%hi
+        part = max(part, in_body(i) * alpha(i - lo + 1))
+      end do
+    end associate
+  end function plastic_strain
+
+  pure real(wp) function kinetic_energy(block) result(part)
+    type(block_view_t), intent(in) :: block
+    real(wp) :: terms(n_block), density(n_block)
+
+    if (block%hi - block%lo + 1 < n_block) terms = 0.0_wp
+    density = 0.0_wp
+    call block%model%materials%density_block(block%number, density)
+    call square(block%lo, block%hi, block%model%points%volume, block%state%velocity, terms)
+    part = 0.5_wp * block_dot(density, terms)
+  end function kinetic_energy
+
+  !> V |v|^2 of rows lo to hi.
+  pure subroutine square(lo, hi, volume, v, terms)
+    integer,  intent(in) :: lo, hi
+    real(wp), intent(in), contiguous :: volume(:), v(:, :)
+    real(wp), intent(inout) :: terms(n_block)
+    integer :: i, b
+
+    !$omp simd simdlen(8) private(b)
+    do i = lo, hi
+      b = i - lo + 1
+      terms(b) = volume(i) * (v(i, 1)**2 + v(i, 2)**2)
+    end do
+  end subroutine square
+
+  pure real(wp) function strain_energy(block) result(part)
+    type(block_view_t), intent(in) :: block
+    real(wp) :: terms(n_block)
+    integer  :: i, b
+
+    if (block%hi - block%lo + 1 < n_block) terms = 0.0_wp
+    call block%model%materials%energy_block(block%number, block%state%law_points_t, terms)
+    associate (volume => block%model%points%volume)
+      !$omp simd simdlen(8) private(b)
+      do i = block%lo, block%hi
+        b = i - block%lo + 1
+        terms(b) = volume(i) * terms(b)
+      end do
+    end associate
+    part = block_sum(terms)
+  end function strain_energy
+
+  ! ---- from elsewhere -----------------------------------------------------------------------
+
+  pure real(wp) function step(row) result(value)
+    type(row_view_t), intent(in) :: row
+
+    value = real(row%moment%step, wp)
+  end function step
+
+  pure real(wp) function time(row) result(value)
+    type(row_view_t), intent(in) :: row
+
+    value = row%moment%time
+  end function time
+
+  pure real(wp) function strain(row) result(value)
+    type(row_view_t), intent(in) :: row
+
+    value = row%moment%strain
+  end function strain
+
+  pure real(wp) function force(row) result(value)
+    type(row_view_t), intent(in) :: row
+
+    value = row%model%boundaries(row%boundary)%force(row%component)
+  end function force
+
+  pure real(wp) function plastic_dissipation(row) result(value)
+    type(row_view_t), intent(in) :: row
+
+    value = row%moment%ledger%plastic_dissipation(row%model%blocks)
+  end function plastic_dissipation
+
+  pure real(wp) function damping_dissipation(row) result(value)
+    type(row_view_t), intent(in) :: row
+
+    value = row%moment%ledger%damping_dissipation(row%model%blocks)
+  end function damping_dissipation
+
+  pure real(wp) function stabilisation_energy(row) result(value)
+    type(row_view_t), intent(in) :: row
+
+    value = row%control_energy
+  end function stabilisation_energy
+
+  pure real(wp) function external_work(row) result(value)
+    type(row_view_t), intent(in) :: row
+
+    value = row%moment%ledger%external_work(row%model%blocks)
+  end function external_work
+
+  pure real(wp) function energy_error(row) result(value)
+    type(row_view_t), intent(in) :: row
+
+    associate (ledger => row%moment%ledger)
+      value = surplus(row%seen, ledger)
+      if (abs(value) > 0.0_wp) value = value &
+        / max(abs(row%seen%value('external_work')), ledger%initial_kinetic_energy, abs(value))
+    end associate
+  end function energy_error
+
+end module pd_history_columns

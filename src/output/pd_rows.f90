@@ -1,0 +1,120 @@
+!> The history in a result file: /history/<column>, one dataset per column.
+!>
+!> All rows have their place when the file is made, and are filled in bunches: data written in place
+!> and handed to the operating system, then `written`, the number of rows that are good. A kill at
+!> any moment costs the rows of the last bunch and no others.
+module pd_rows
+  use pd_errors, only: error_list_t
+  use pd_frames, only: write_label
+  use pd_hdf5, only: create_group, flush_file, hdf5_file_t, overwrite_part, read_attribute, &
+    read_dataset, reserve_dataset, reserve_whole_numbers, write_attribute
+  use pd_kinds, only: wp
+  use pd_observe, only: column_t
+  use pd_text, only: integer_text
+  implicit none
+  private
+
+  public :: reserve_rows, put_rows, check_rows, copy_rows
+
+  character(*), parameter :: group = '/history'
+
+contains
+
+  !> Create the history without rows, and take the space of n of them on the disk.
+  subroutine reserve_rows(file, columns, n, errors)
+    type(hdf5_file_t),  intent(inout) :: file
+    type(column_t),     intent(in)    :: columns(:)
+    integer,            intent(in)    :: n
+    type(error_list_t), intent(inout) :: errors
+    integer :: k
+
+    call create_group(file, group, errors)
+    call write_attribute(file, group, 'rows', n, errors)
+    call write_attribute(file, group, 'written', 0, errors)
+    call write_attribute(file, group, 'columns', names_of(columns), errors)
+    do k = 1, size(columns)
+      if (columns(k)%whole_number) then
+        call reserve_whole_numbers(file, place_of(columns(k)), [n], errors)
+      else
+        call reserve_dataset(file, place_of(columns(k)), [n], errors)
+      end if
+      call write_label(file, place_of(columns(k)), columns(k)%label_t, errors)
+    end do
+  end subroutine reserve_rows
+
+  !> Write rows behind the first `written` ones, and say that they are there.
+  subroutine put_rows(file, columns, written, values, errors)
+    type(hdf5_file_t),  intent(inout) :: file
+    type(column_t),     intent(in)    :: columns(:)
+    integer,            intent(in)    :: written
+    real(wp),           intent(in)    :: values(:, :)   !! (columns,rows)
+    type(error_list_t), intent(inout) :: errors
+    integer :: k
+
+    do k = 1, size(columns)
+      call overwrite_part(file, place_of(columns(k)), written + 1, values(k, :), errors)
+    end do
+    call flush_file(file, errors)
+    call write_attribute(file, group, 'written', written + size(values, 2), errors)
+  end subroutine put_rows
+
+  !> Report an error unless a file has these columns and at least n rows.
+  subroutine check_rows(file, columns, n, errors)
+    type(hdf5_file_t),  intent(inout) :: file
+    type(column_t),     intent(in)    :: columns(:)
+    integer,            intent(in)    :: n
+    type(error_list_t), intent(inout) :: errors
+    character(:), allocatable :: found
+    integer :: written
+
+    call read_attribute(file, group, 'columns', found, errors)
+    call read_attribute(file, group, 'written', written, errors)
+    if (.not. file%is_good()) return
+    if (found /= names_of(columns)) then
+      call errors%add('the history has other columns than this run writes', where=file%path, &
+        found=found, allowed=names_of(columns))
+    else if (written < n) then
+      call errors%add('the history has fewer rows than the checkpoint knows of', &
+        where=file%path, found=integer_text(written), allowed='at least '//integer_text(n))
+    end if
+  end subroutine check_rows
+
+  !> Copy the first n rows from one result file into another.
+  subroutine copy_rows(old, new, columns, n, errors)
+    type(hdf5_file_t),  intent(inout) :: old, new
+    type(column_t),     intent(in)    :: columns(:)
+    integer,            intent(in)    :: n
+    type(error_list_t), intent(inout) :: errors
+    real(wp), allocatable :: values(:), rows(:, :)
+    integer :: k
+
+    allocate (rows(size(columns), n))
+    do k = 1, size(columns)
+      call read_dataset(old, place_of(columns(k)), values, errors)
+      if (.not. old%is_good()) return
+      rows(k, :) = values(:n)
+    end do
+    call put_rows(new, columns, 0, rows, errors)
+  end subroutine copy_rows
+
+  pure function place_of(column) result(place)
+    type(column_t), intent(in) :: column
+    character(:), allocatable :: place
+
+    place = group//'/'//trim(column%name)
+  end function place_of
+
+  !> The names of the columns in their order, blank between.
+  pure function names_of(columns) result(names)
+    type(column_t), intent(in) :: columns(:)
+    character(:), allocatable :: names
+    integer :: k
+
+    names = ''
+    do k = 1, size(columns)
+      names = names//' '//trim(columns(k)%name)
+    end do
+    names = trim(adjustl(names))
+  end function names_of
+
+end module pd_rows
