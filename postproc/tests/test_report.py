@@ -412,6 +412,8 @@ def test_studies_without_results_are_named(results: Path, tmp_path: Path) -> Non
         ({"findings": [{"title": "a", "verdict": "agrees", "holds": ["a"]}]}, "holds[0]"),
         ({"units": {"a": 1}}, "'units.a' is 1; it must be text"),
         ({"problems": "a"}, "'problems' is \"a\"; it must be a list of texts"),
+        ({"title": 3, "csv": 4}, "'title' is 3; it must be text"),
+        ({"title": 3, "csv": 4}, "'csv' is 4; it must be text"),
     ],
 )
 def test_a_broken_study_is_named_with_the_reason(

@@ -288,6 +288,43 @@ def test_all_mistakes_are_found_at_once(wrong: Any) -> None:
         assert any(word in line for line in found), word
 
 
+def test_what_is_wrong_does_not_hide_what_else_is_wrong(wrong: Any) -> None:
+    """A mistake of form in each table, and beside it one that only the rest of it shows."""
+    text = HEAD.replace('["band"]', '["bend", "peek", 3]') + (
+        'strain = "1 %"\nextra = 1\n[parameters]\nm = [1, 2]\nrun = 1\n'
+        "[set.body]\nx_mim = 'unset'\nx_min = 2020-01-01\n"
+        "[[case]]\nlabel = 3\nset = { 'body.y_mim' = 'unset' }\n"
+        "[[figure]]\nname = 'W'\nkind = 'plot'\nx = 1\ny = 'wdith'\ntitle = ''\n"
+        "[[finding]]\ntitle = 'F'\nfound = '{b}'\nvalues = { a = 1, c = 'n' }\n"
+        "holds = ['1 +', 'd']\n"
+    )
+    expected = [
+        "line 4, measures: must be a text; found: 3",
+        "line 4, measures: unknown measure, did you mean 'band'?; found: \"bend\"",
+        "line 4, measures: unknown measure, did you mean 'peak'?; found: \"peek\"",
+        "line 5, strain: must be a number",
+        "line 6, extra: unknown key",
+        "line 9, parameters, run: cannot be the name",
+        'line 11, set, "body.x_mim": there is no x_mim to take out',
+        'line 12, set, "body.x_min": must be a number, a text or a list of them; found: 2020-01-01',
+        "line 14, case 1, label: must be a text; found: 3",
+        'line 15, case 1, set, "body.y_mim": there is no y_mim to take out',
+        "line 17, figure 1, name: is no name",
+        "line 19, figure 1, x: must be a text; found: 1",
+        'line 20, figure 1, y: unknown column; found: "wdith"',
+        "line 21, figure 1, title: must not be empty",
+        "line 16, figure 1: the key alt is missing",
+        "line 24, finding 1, found: unknown name {b}",
+        "line 25, finding 1, values, a: must be an expression, a text; found: 1",
+        "line 25, finding 1, values, c: 'n': unknown name n",
+        "line 26, finding 1, holds: '1 +' is no expression",
+        "line 26, finding 1, holds: 'd': unknown name d",
+    ]
+    found = wrong(text)
+    for line in expected:
+        assert any(one.startswith(line) for one in found), (line, found)
+
+
 @pytest.mark.parametrize(
     ("base", "found"),
     [

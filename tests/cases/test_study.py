@@ -19,12 +19,14 @@ from perigeo_post import RequestError, StudyError, StudyOptions, run_study
 from perigeo_post.cli.command_line import main
 from perigeo_post.draw.style import new_figure
 from perigeo_post.measure import curves
+from perigeo_post.study.checked import mistakes
 from perigeo_post.study.figures import FIGURE_OPTIONS
 from perigeo_post.study.file import Kinds
 from perigeo_post.study.jobs import only_one
 from perigeo_post.study.measures import MEASURES
-from perigeo_post.study.tables import OPTIONS
+from perigeo_post.study.tables import OPTIONS, FigureOptions
 from perigeo_post.study.types import Column, Drawing, Measure, Missing
+from pydantic import ValidationError
 
 BASE = SPECIMEN.replace("output_dir = 'out'", "title = 'a specimen'")
 STUDY = """\
@@ -557,7 +559,12 @@ def test_the_page_on_studies_names_every_measure_column_kind_and_option():
     for kind, own in FIGURE_OPTIONS.items():
         row = re.search(rf"^\| `{kind}` .*$", kinds, re.M).group()
         assert set(re.findall(r"`(\w+)`", row)) == {kind} | (set(own) - of_all)
-    assert set(re.findall(r"^\| `(\w+)` \|", options, re.M)) == set(OPTIONS)
+    forms = dict(re.findall(r"^\| `(\w+)` \| (.*?) \|", options, re.M))
+    assert set(forms) == set(OPTIONS)
+    for name, form in forms.items():
+        with pytest.raises(ValidationError) as caught:
+            FigureOptions.model_validate({name: object()})
+        assert [one.what for one in mistakes(caught.value)] == [f"must be {form}"], name
 
 
 def test_the_example_of_the_page_on_studies_works(program, tmp_path, monkeypatch, capsys):

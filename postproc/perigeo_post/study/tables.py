@@ -371,24 +371,23 @@ def _complain(error: ValidationError, problems: Problems) -> None:
 
 def _repair(data: dict[str, Any], error: ValidationError) -> None:
     """Take out what is wrong; put an empty text in place of what is missing."""
-    for one in error.errors(include_url=False):
-        names = [part for part in one["loc"] if part != "[key]"]
-        missing = one["type"] == "missing"
-        if isinstance(one["input"], dict) and isinstance(names[-1], int):
+    # From behind, so that the numbers of what stands before in a list stay right.
+    for one in reversed(error.errors(include_url=False)):
+        place = [part for part in one["loc"] if part != "[key]"]
+        if place[-2:-1] and place[-2] in _LISTS and isinstance(one["input"], dict):
             continue  # a table as a whole: it may stay
-        while names and isinstance(names[-1], int):
-            names.pop()
-        table: Any = data
-        for name in names[:-1]:
-            try:
-                table = table[name]
-            except (KeyError, IndexError, TypeError):
+        parent: Any = data
+        for k, part in enumerate(place[:-1]):
+            if isinstance(parent, dict) and isinstance(parent.get(part), str):
+                place = place[: k + 1]  # one text in place of a list of them
                 break
+            parent = parent[part] if isinstance(part, int) else parent.get(part, {})
+        if one["type"] == "missing":
+            parent[place[-1]] = ""
+        elif isinstance(place[-1], int):
+            del parent[place[-1]]
         else:
-            if names and isinstance(table, dict):
-                _take_out(table, names[-1])
-                if missing:
-                    table[names[-1]] = ""
+            _take_out(parent, place[-1])
 
 
 def _take_out(table: dict[str, Any], name: Any) -> None:
