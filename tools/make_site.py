@@ -57,7 +57,7 @@ print_creation_date: false
 STYLE = """\
 img { max-width: 100%; height: auto; }
 pre { overflow-x: auto; }
-#text table { display: block; overflow-x: auto; }
+#text table { display: block; overflow-x: auto; margin-bottom: 1em; }
 td, th { padding: 0.2em 0.8em 0.2em 0; }
 .err { border: 0 !important; color: inherit !important; }
 @media (max-width: 700px) { .col-3, .col-9 { width: 100%; } }
@@ -104,10 +104,14 @@ def document(source: str, front: bool = False) -> tuple[str, str]:
         to = target(source, link, front)
         return f"{image}[{words}]({to})" if to else words
 
+    def plain(example: str) -> str:
+        """Keep FORD from guessing a language where none is named."""
+        return "```text" + example[3:] if example.startswith("```\n") else example
+
     # Fenced examples stay as they are.
     text = (ROOT / source).read_text(encoding="utf-8")
     parts = re.split(r"(^```.*?^```$)", text, flags=re.DOTALL | re.MULTILINE)
-    text = "".join(LINK.sub(led, part) if k % 2 == 0 else part for k, part in enumerate(parts))
+    text = "".join(plain(part) if k % 2 else LINK.sub(led, part) for k, part in enumerate(parts))
     first, _, rest = text.partition("\n")
     if not first.startswith("# "):
         sys.exit(f"{source}: its first line is no heading")

@@ -132,9 +132,9 @@ contains
     description%boundary = model%body%boundary
     if (size(model%materials%remembered()) > 0) &
       description%yield_stress = model%strength(model%operators%storage%row)
-    allocate (character(64) :: description%boundary_names(size(model%boundaries)))
-    do k = 1, size(model%boundaries)
-      description%boundary_names(k) = model%boundaries(k)%name
+    allocate (character(64) :: description%boundary_names(size(model%supports%items)))
+    do k = 1, size(model%supports%items)
+      description%boundary_names(k) = model%supports%items(k)%support%name
     end do
     call frame_fields(description%fields)
     call history_columns(model, description%columns)
@@ -213,8 +213,9 @@ contains
       status%has_strain = .true.
       moment = moment_at(clock, model, state, record%moment%ledger)
       status%strain = moment%strain
-      status%axial_stress = &
-        model%boundaries(model%platens%first)%force(model%platens%axis) / model%platens%width
+      associate (first => model%supports%items(model%platens%first)%support)
+        status%axial_stress = first%force(model%platens%axis) / model%platens%width
+      end associate
     end if
     call show_progress(record%progress, status, errors)
   end subroutine record_progress

@@ -20,7 +20,7 @@ from .errors import ResultError, SchemaError
 from .fields import DEFAULT_COMPONENTS, Field
 
 SCHEMA = "perigeo result"
-SCHEMA_VERSIONS = (1,)
+SCHEMA_VERSIONS = (1, 2)
 T = TypeVar("T")
 _ATTEMPTS = 4  # a reading can fall into the moment in which the program writes
 _PAUSE = 0.15  # [s] between them
