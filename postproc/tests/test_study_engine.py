@@ -118,6 +118,7 @@ def test_columns_are_joined_run_by_run() -> None:
     assert table_value("w / d", w=width, d=delta).by_run == {"a": 2.0, "c": 5.0}
     assert table_value("(2 * w - 1)[1]", w=width) == 11.0
     assert table_value("all(1 < w < 7)", w=width) is True
+    assert table_value("all(3 < w < 7)", w=width) is False
     assert table_value("all(w < d)", w=width, d=delta) is False
     assert table_value("ratio(w) + mean(w) + median(w) + len(w) + sum(w)", w=width) == (
         pytest.approx(3 + 13 / 3 + 5 + 3 + 13)

@@ -290,7 +290,7 @@ def test_all_mistakes_are_found_at_once(wrong: Any) -> None:
 
 def test_what_is_wrong_does_not_hide_what_else_is_wrong(wrong: Any) -> None:
     """A mistake of form in each table, and beside it one that only the rest of it shows."""
-    text = HEAD.replace('["band"]', '["bend", "peek", 3]') + (
+    text = HEAD.replace('["band"]', '[2, "bend", 3, "peek"]') + (
         'strain = "1 %"\nextra = 1\n[parameters]\nm = [1, 2]\nrun = 1\n'
         "[set.body]\nx_mim = 'unset'\nx_min = 2020-01-01\n"
         "[[case]]\nlabel = 3\nset = { 'body.y_mim' = 'unset' }\n"
