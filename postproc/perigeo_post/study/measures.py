@@ -35,25 +35,22 @@ Values = dict[str, Union[Value, Missing]]
 Part = Callable[[Run, State], Values]
 
 
-def _measure(columns: Mapping[str, Column], parts: Mapping[Part, str]) -> Measure:
-    """A group whose columns are filled by several parts, each of which may fail by itself.
-
-    parts: what gives values, and the names of the columns that it fills.
-    """
+def _measure(parts: Mapping[Part, Mapping[str, Column]]) -> Measure:
+    """A group of columns: what gives values, each with its columns, may fail by itself."""
 
     def take(run: Run, state: State) -> Values:
         found: Values = {}
-        for part, names in parts.items():
+        for part, columns in parts.items():
             try:
                 values = part(run, state)
             except (PostError, ValueError, ArithmeticError, np.linalg.LinAlgError) as error:
                 reason = str(error) if isinstance(error, PostError) else type(error).__name__
-                found.update(dict.fromkeys(names.split(), Missing(reason)))
+                found.update(dict.fromkeys(columns, Missing(reason)))
             else:
-                found.update({name: _plain(values[name]) for name in names.split()})
-        return {name: found[name] for name in columns}
+                found.update({name: _plain(values[name]) for name in columns})
+        return found
 
-    return Measure(columns, take)
+    return Measure({k: v for columns in parts.values() for k, v in columns.items()}, take)
 
 
 def _plain(value: Value | Missing) -> Value | Missing:
@@ -80,10 +77,14 @@ def frame_of(run: Run, state: State) -> Frame:
 _CURVE = {
     "peak_stress": Column("Pa", "largest axial stress (reaction of the first platen over width)"),
     "strain_at_peak": Column("1", "nominal strain at the peak stress"),
-    "state_strain": Column("1", "nominal strain of the frame at which fields are measured"),
-    "stress_at_state": Column("Pa", "axial stress at the time of that frame"),
     "last_strain": Column("1", "nominal strain at the end of the run"),
     "last_stress": Column("Pa", "axial stress at the end of the run"),
+}
+_AT_STATE = {
+    "stress_at_state": Column("Pa", "axial stress at the time of the frame of the state"),
+}
+_FRAME = {
+    "state_strain": Column("1", "nominal strain of the frame at which fields are measured"),
     "largest_alpha": Column("1", "largest equivalent plastic strain of the body in that frame"),
 }
 
@@ -116,34 +117,42 @@ def _frame_numbers(run: Run, state: State) -> Values:
 # ---- modulus -------------------------------------------------------------------------------
 
 _NU = "times 1 - nu^2, from 0.02 to 0.1 % strain"
-_MODULUS = {
-    "modulus_platen": Column("Pa", f"slope of platen reaction over width against strain, {_NU}"),
-    "modulus_gauge": Column(
-        "Pa", f"slope of the same stress against the strain between two lines inside, {_NU}"
+_MODULUS: dict[str, tuple[Column, Callable[[Run], float | None]]] = {
+    "modulus_platen": (
+        Column("Pa", f"slope of platen reaction over width against strain, {_NU}"),
+        lambda run: apparent_modulus(run).value,
     ),
-    "modulus_gauge_rows": Column(
-        "Pa", "as modulus_gauge, but from single rows of points, which carry zero-energy modes"
+    "modulus_gauge": (
+        Column(
+            "Pa", f"slope of the same stress against the strain between two lines inside, {_NU}"
+        ),
+        lambda run: gauge_modulus(run).value,
     ),
-    "modulus_mean": Column("Pa", f"slope of mean stress against mean strain of the body, {_NU}"),
-    "modulus_mean_corrected": Column(
-        "Pa", "as modulus_mean, without what the mean lateral stress adds to the axial stress"
+    "modulus_gauge_rows": (
+        Column(
+            "Pa", "as modulus_gauge, but from single rows of points, which carry zero-energy modes"
+        ),
+        lambda run: gauge_modulus(run, thick=False).value,
     ),
-    "modulus_target": Column("Pa", "Young's modulus of the input"),
+    "modulus_mean": (
+        Column("Pa", f"slope of mean stress against mean strain of the body, {_NU}"),
+        lambda run: mean_modulus(run).value,
+    ),
+    "modulus_mean_corrected": (
+        Column(
+            "Pa", "as modulus_mean, without what the mean lateral stress adds to the axial stress"
+        ),
+        lambda run: mean_modulus(run, True).value,
+    ),
+    "modulus_target": (
+        Column("Pa", "Young's modulus of the input"),
+        lambda run: run.number("material.youngs_modulus"),
+    ),
 }
 
 
-_MODULUS_PARTS: dict[Part, str] = {
-    lambda run, _: {"modulus_platen": apparent_modulus(run).value}: "modulus_platen",
-    lambda run, _: {"modulus_gauge": gauge_modulus(run).value}: "modulus_gauge",
-    lambda run, _: {
-        "modulus_gauge_rows": gauge_modulus(run, thick=False).value
-    }: "modulus_gauge_rows",
-    lambda run, _: {"modulus_mean": mean_modulus(run).value}: "modulus_mean",
-    lambda run, _: {
-        "modulus_mean_corrected": mean_modulus(run, True).value
-    }: "modulus_mean_corrected",
-    lambda run, _: {"modulus_target": run.number("material.youngs_modulus")}: "modulus_target",
-}
+def _modulus(name: str) -> Part:
+    return lambda run, state: {name: _MODULUS[name][1](run)}
 
 
 # ---- band ----------------------------------------------------------------------------------
@@ -161,11 +170,13 @@ _BAND = {
     "angle": Column("degrees", "angle between the prevailing band and the loading axis"),
     "angle_uncertainty": Column("degrees", "one spacing over the length fitted"),
     "direction": Column("1", "diagonal of the prevailing band, rising or falling"),
+    "profile_mirrored": Column("1", "true: the given line was mirrored to cross the band"),
+}
+_PATTERN = {
     "band_ratio": Column("1", "weaker over stronger band, plastic strain so far"),
     "band_ratio_growing": Column("1", "the same of what was added since the frame before"),
     "pattern": Column("1", "X: weaker band from 0.25 of the stronger on; single; diffuse; none"),
     "pattern_growing": Column("1", "the same of what was added, X from 0.5 on"),
-    "profile_mirrored": Column("1", "true: the given line was mirrored to cross the band"),
 }
 
 
@@ -227,17 +238,25 @@ def _pattern(run: Run, state: State) -> Values:
 
 # ---- quality -------------------------------------------------------------------------------
 
-_QUALITY = {
+_KINETIC = {
     "kinetic_ratio": Column("1", "kinetic energy of v - v_ref over internal energy at the state"),
     "kinetic_ratio_largest": Column("1", "largest of the frames from 0.05 % strain on"),
+}
+_KINETIC_BOUND = {
     "kinetic_bound_peak": Column("1", "upper bound of that ratio at the peak stress"),
     "kinetic_bound_largest": Column("1", "largest upper bound from 0.05 % strain on"),
+}
+_GAP = {
     "reaction_gap": Column(
         "1", "difference of the platen reactions over the largest, at the state"
     ),
     "reaction_gap_peak": Column("1", "the same at the peak stress"),
     "reaction_gap_largest": Column("1", "largest from 0.05 % strain on"),
+}
+_BALANCE = {
     "energy_error_largest": Column("1", "largest error of the energy balance of the program"),
+}
+_ZERO_ENERGY = {
     "zero_energy_largest": Column("1", "largest zero-energy measure of the body at the state"),
 }
 
@@ -275,19 +294,27 @@ def _zero_energy(run: Run, state: State) -> Values:
 
 # ---- softening -----------------------------------------------------------------------------
 
-_SOFTENING = {
+_BRANCH = {
     "strain_at_90": Column("1", "nominal strain where the stress has fallen to 90 % of its peak"),
     "strain_at_50": Column("1", "nominal strain where it has fallen to 50 %"),
     "softening_slope": Column("Pa", "fall of stress over strain between 90 and 50 % of the peak"),
     "softening_displacement": Column("m", "approach of the platens between 90 and 50 %"),
+}
+_BRITTLENESS = {
     "brittleness": Column("1", "softening_slope over the elastic slope"),
+}
+_STRESS_RATIO = {
     "stress_ratio": Column("1", "axial stress at the state over its peak"),
-    **{
-        f"stress_{name}": Column("Pa", f"axial stress at {100.0 * s:g} % nominal strain")
-        for name, s in STRAINS.items()
-    },
+}
+_STRESSES = {
+    f"stress_{name}": Column("Pa", f"axial stress at {100.0 * s:g} % nominal strain")
+    for name, s in STRAINS.items()
+}
+_DISSIPATION = {
     "dissipated_energy": Column("J/m", "plastic work up to the state"),
     "dissipated_density": Column("J/m^3", "the same over the area of the body"),
+}
+_RATE = {
     "strain_rate": Column("1/s", "mean rate of the nominal strain"),
     "approach_velocity": Column("m/s", "mean velocity at which the platens approach"),
 }
@@ -341,6 +368,8 @@ _FIELD = {
     "yield_stress_mean": Column("Pa", "mean initial yield stress of the body, over its volume"),
     "yield_stress_variation": Column("1", "its coefficient of variation"),
     "yield_stress_least": Column("Pa", "its smallest value"),
+}
+_FIELD_IN_BAND = {
     "yield_stress_band": Column("Pa", "its mean where the plastic strain exceeds half the peak"),
 }
 
@@ -377,50 +406,27 @@ def _field_in_band(run: Run, state: State) -> Values:
 
 
 MEASURES: dict[str, Measure] = {
-    "curve": _measure(
-        _CURVE,
-        {
-            _curve: "peak_stress strain_at_peak last_strain last_stress",
-            _curve_at_state: "stress_at_state",
-            _frame_numbers: "state_strain largest_alpha",
-        },
-    ),
-    "modulus": _measure(_MODULUS, _MODULUS_PARTS),
-    "band": _measure(
-        _BAND,
-        {
-            _band: "width width_uncertainty width_closed width_over_horizon "
-            "width_over_horizon_uncertainty width_over_spacing width_median width_spread "
-            "peak_alpha angle angle_uncertainty direction profile_mirrored",
-            _pattern: "band_ratio band_ratio_growing pattern pattern_growing",
-        },
-    ),
+    "curve": _measure({_curve: _CURVE, _curve_at_state: _AT_STATE, _frame_numbers: _FRAME}),
+    "modulus": _measure({_modulus(name): {name: about} for name, (about, _) in _MODULUS.items()}),
+    "band": _measure({_band: _BAND, _pattern: _PATTERN}),
     "quality": _measure(
-        _QUALITY,
         {
-            _kinetic: "kinetic_ratio kinetic_ratio_largest",
-            _bound: "kinetic_bound_peak kinetic_bound_largest",
-            _gap: "reaction_gap reaction_gap_peak reaction_gap_largest",
-            _balance: "energy_error_largest",
-            _zero_energy: "zero_energy_largest",
-        },
+            _kinetic: _KINETIC,
+            _bound: _KINETIC_BOUND,
+            _gap: _GAP,
+            _balance: _BALANCE,
+            _zero_energy: _ZERO_ENERGY,
+        }
     ),
     "softening": _measure(
-        _SOFTENING,
         {
-            _branch: "strain_at_90 strain_at_50 softening_slope softening_displacement",
-            _brittleness: "brittleness",
-            _stresses: " ".join(f"stress_{name}" for name in STRAINS),
-            _stress_ratio: "stress_ratio",
-            _dissipation: "dissipated_energy dissipated_density",
-            _rate: "strain_rate approach_velocity",
-        },
+            _branch: _BRANCH,
+            _brittleness: _BRITTLENESS,
+            _stress_ratio: _STRESS_RATIO,
+            _stresses: _STRESSES,
+            _dissipation: _DISSIPATION,
+            _rate: _RATE,
+        }
     ),
-    "field": _measure(
-        _FIELD,
-        {
-            _field: "yield_stress_mean yield_stress_variation yield_stress_least",
-            _field_in_band: "yield_stress_band",
-        },
-    ),
+    "field": _measure({_field: _FIELD, _field_in_band: _FIELD_IN_BAND}),
 }
