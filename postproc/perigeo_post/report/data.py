@@ -11,26 +11,36 @@ from pathlib import Path
 from pydantic import BaseModel, ConfigDict, TypeAdapter
 
 from ..read.errors import ResultError
-from ..study.record import AGREES as AGREES
-from ..study.record import DIFFERS as DIFFERS
-from ..study.record import DONE as DONE
-from ..study.record import FAILED as FAILED
-from ..study.record import IN_PART as IN_PART
-from ..study.record import MISSING as MISSING
-from ..study.record import NO_RESULT as NO_RESULT
-from ..study.record import VERDICTS as VERDICTS
-from ..study.record import FigureRecord as FigureRecord
+from ..study.record import (
+    AGREES,
+    DIFFERS,
+    DONE,
+    FAILED,
+    IN_PART,
+    MISSING,
+    NO_RESULT,
+    VERDICTS,
+    FigureRecord,
+    Needed,
+    RunRecord,
+    Text,
+    read_json,
+    read_record,
+)
 from ..study.record import FindingRecord as Finding
-from ..study.record import Needed, Text, read_json, read_record
-from ..study.record import RunRecord as RunRecord
 from ..study.record import StudyRecord as Study
-
-__all__ = ["Finding", "Study"]
 
 if sys.version_info >= (3, 11):
     import tomllib
 else:
     import tomli as tomllib
+
+# What the pages need of a study stands in its record.
+__all__ = [
+    "AGREES", "DIFFERS", "DONE", "FAILED", "IN_PART", "MISSING", "NO_RESULT", "VERDICTS",
+    "CheckRow", "FigureRecord", "Finding", "Material", "RunRecord", "Study", "gather",
+    "known_studies", "rank", "read_checks", "read_table",
+]  # fmt: skip
 
 # The order of the paper; other studies follow by name.
 ORDER = (
