@@ -1,11 +1,12 @@
-!> Answers without a run: --help, --version, --input-reference, --check.
+!> Answers without a run: --help, --version, --input-reference, --print-input, --check.
 module pd_check
   use, intrinsic :: iso_fortran_env, only: output_unit
   use omp_lib, only: omp_get_max_threads
   use pd_command_line, only: options_t, print_help
-  use pd_errors, only: exit_ok, outcome_t
-  use pd_input_json, only: write_input_json
-  use pd_input_reference, only: write_input_reference
+  use pd_errors, only: error_list_t, exit_input, exit_ok, outcome_t
+  use pd_input, only: print_input
+  use pd_input_reference, only: write_input_reference, write_input_reference_json
+  use pd_input_types, only: all_keys
   use pd_kinds, only: wp
   use pd_run, only: run_t
   use pd_stability, only: find_highest_frequency
@@ -18,20 +19,26 @@ module pd_check
 
 contains
 
-  !> Answer what needs no input; the program then ends.
+  !> Answer what needs no model; the program then ends.
   subroutine answer_questions(options, outcome)
     type(options_t), intent(in)    :: options
     type(outcome_t), intent(inout) :: outcome
+    type(error_list_t) :: errors
 
     if (options%help) call print_help()
     if (options%version) write (output_unit, '(a)') 'perigeo '//code_version//' ('//git_hash//')'
     if (options%input_reference .and. options%json) then
-      call write_input_json(output_unit)
+      call write_input_reference_json(all_keys(), output_unit)
     else if (options%input_reference) then
-      call write_input_reference(output_unit)
+      call write_input_reference(all_keys(), output_unit)
     end if
-    if (options%help .or. options%version .or. options%input_reference) &
+    if (options%help .or. options%version .or. options%input_reference) then
       call outcome%end_with(exit_ok)
+    else if (options%print_input) then
+      call print_input(options%input_path, output_unit, errors, options%settings)
+      call outcome%end_if_any(errors, exit_input)
+      if (.not. outcome%done) call outcome%end_with(exit_ok)
+    end if
   end subroutine answer_questions
 
   !> Print the derived figures of a run that is set up; the program then ends.

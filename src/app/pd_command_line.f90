@@ -2,7 +2,7 @@
 module pd_command_line
   use, intrinsic :: iso_fortran_env, only: output_unit
   use pd_errors, only: error_list_t
-  use pd_settings, only: setting_t
+  use pd_input, only: setting_t
   use pd_text, only: nearest_name
   implicit none
   private
@@ -13,11 +13,11 @@ module pd_command_line
   type :: options_t
     character(:), allocatable :: input_path
     character(:), allocatable :: output_dir   !! '': as in the input
+    type(setting_t), allocatable :: settings(:)   !! values in place of those of the input file
     integer :: threads = 0                    !! 0: as OMP_NUM_THREADS says
     logical :: check = .false., restart = .false., force = .false., quiet = .false.
     logical :: version = .false., help = .false., input_reference = .false.
     logical :: json = .false., print_input = .false.
-    type(setting_t), allocatable :: settings(:)   !! group.key=value
   end type options_t
 
 contains
@@ -30,7 +30,6 @@ contains
     type(options_t),    intent(out)   :: options
     type(error_list_t), intent(inout) :: errors
     character(:), allocatable :: word
-    type(setting_t) :: setting
     integer :: i
 
     options%input_path = ''
@@ -40,6 +39,10 @@ contains
     do while (i < command_argument_count())
       i = i + 1
       word = argument(i)
+      if (index(word, '-') /= 1) then
+        call take_input_path(word, options, errors)
+        cycle
+      end if
       select case (word)
       case ('--check')
         options%check = .true.
@@ -60,20 +63,21 @@ contains
       case ('--print-input')
         options%print_input = .true.
       case ('--set')
-        call value_of('--set', 'group.key=value', setting%text)
-        options%settings = [options%settings, setting]
+        call value_of('--set', 'group.key=value', word)
+        call add_setting(word, options)
       case ('--output')
         call value_of('--output', 'a folder', options%output_dir)
       case ('--threads')
         call read_threads(options%threads)
       case default
-        call take_input_path(word, options, errors)
+        call report_unknown(word, errors)
       end select
     end do
+    if (options%json .and. .not. options%input_reference) call errors%add( &
+      '--json goes with --input-reference')
     if (options%version .or. options%help .or. options%input_reference) return
     if (options%input_path == '' .and. errors%count() == 0) &
       call errors%add('no input file is given; perigeo --help shows how')
-    if (options%json) call errors%add('--json goes with --input-reference alone')
     if (options%restart .and. options%force) call errors%add('--restart goes on with the '// &
       'results of an earlier run, --force overwrites them: use one of them')
 
@@ -115,21 +119,43 @@ contains
     character(*),       intent(in)    :: word
     type(options_t),    intent(inout) :: options
     type(error_list_t), intent(inout) :: errors
-    character(17), parameter :: known(12) = [character(17) :: '--check', '--output', '--threads', &
-      '--restart', '--force', '--quiet', '--version', '--help', '--input-reference', '--json', &
-      '--set', '--print-input']
-    character(:), allocatable :: near
 
-    if (index(word, '-') == 1) then
-      near = nearest_name(word, known)
-      if (near /= '') near = '; did you mean '//near//'?'
-      call errors%add('unknown option '//word//near)
-    else if (options%input_path /= '') then
+    if (options%input_path /= '') then
       call errors%add('more than one input file is given: '//options%input_path//' and '//word)
     else
       options%input_path = word
     end if
   end subroutine take_input_path
+
+  !> One --set more.
+  subroutine add_setting(text, options)
+    character(*),    intent(in)    :: text
+    type(options_t), intent(inout) :: options
+    type(setting_t), allocatable :: more(:)
+    integer :: i, n
+
+    n = size(options%settings)
+    allocate (more(n + 1))
+    do i = 1, n
+      more(i)%text = options%settings(i)%text
+    end do
+    more(n + 1)%text = text
+    call move_alloc(more, options%settings)
+  end subroutine add_setting
+
+  !> Name the option that was meant, where one is near.
+  subroutine report_unknown(word, errors)
+    character(*),       intent(in)    :: word
+    type(error_list_t), intent(inout) :: errors
+    character(17), parameter :: known(12) = [character(17) :: '--check', '--output', '--threads', &
+      '--restart', '--force', '--quiet', '--version', '--help', '--input-reference', '--json', &
+      '--set', '--print-input']
+    character(:), allocatable :: near
+
+    near = nearest_name(word, known)
+    if (near /= '') near = '; did you mean '//near//'?'
+    call errors%add('unknown option '//word//near)
+  end subroutine report_unknown
 
   !> Argument i in its whole length.
   function argument(i) result(word)
@@ -153,18 +179,17 @@ contains
       '  RUN.nml             the input file, Fortran namelists: see doc/input.md and input/', &
       '', &
       '  --check             check the input and print the derived figures; run nothing', &
-      '  --set GROUP.KEY=VALUE', &
-      '                      a value in place of the one in the file; several times. A group that', &
-      '                      stands several times by its name or number: boundary.top.velocity=0,-1', &
-      '  --print-input       print all values as used, as an input file; run nothing', &
       '  --output DIR        folder for the results (default: output_dir of the input file,', &
       '                      or results/<name>)', &
       '  --threads N         number of threads (default: OMP_NUM_THREADS, or all cores)', &
       '  --restart           go on from the newest checkpoint in the output folder', &
       '  --force             overwrite the results of an earlier run', &
       '  --quiet             no progress on the screen; errors still appear', &
-      '  --input-reference   print the reference of all input keys (doc/input.md); with --json for', &
-      '                      programs', &
+      '  --set GROUP.KEY=VALUE    a value in place of that of the input file, as often as needed:', &
+      '                      material.density=1800, boundary.top.velocity=0,-0.02, body.2.x_max=1', &
+      '  --print-input       print an input file with all values as used; run nothing', &
+      '  --input-reference   print the tables of all input keys (as in doc/input.md); with --json', &
+      '                      for programs', &
       '  --version, --help', &
       '', &
       'Results, in the output folder: <name>_history.csv (curves), <name>.h5 (fields),', &

@@ -1,51 +1,49 @@
-!> The groups of a file against the table of keys, and their values fetched from it.
+!> The groups of a file against the keys that there are.
 !>
 !> `check_groups` names everything that is wrong with one key alone and marks it as damaged; the
-!> `take_` procedures then only fetch: the value given, else the default, else nothing.
+!> reader (`pd_key_reader`) then only fetches.
 module pd_input_values
   use pd_errors, only: error_list_t
-  use pd_key_table, only: group_table, key_table
+  use pd_key_list, only: key_list_t
   use pd_keys, only: allowed_values, find_group, find_key, group_key_t, key_t, keys_of, &
     kind_integer, kind_text, words_of
-  use pd_kinds, only: is_set, unset, wp
-  use pd_namelist, only: max_problems, namelist_entry_t, namelist_group_t, namelist_value_t, &
-    place_of
+  use pd_kinds, only: is_set, wp
+  use pd_namelist, only: max_problems, namelist_group_t, namelist_value_t, place_of
   use pd_text, only: integer_text, is_name, nearest_name, quoted_list, read_integer, &
     read_number, shortened
   implicit none
   private
 
   public :: check_groups, group_named, count_groups, is_given, is_damaged
-  public :: take_real, take_integer, take_text, take_list, take_vector
+  public :: did_you_mean, problem_of_range
 
 contains
 
   !> Check every group and key of a file for itself: unknown, missing and repeated ones, and
   !> values of the wrong kind, number or range. What is wrong is marked as damaged.
-  subroutine check_groups(groups, errors, path)
+  subroutine check_groups(groups, list, errors, path)
     type(namelist_group_t), intent(inout) :: groups(:)
+    type(key_list_t),       intent(in)    :: list          !! what there is
     type(error_list_t),     intent(inout) :: errors
     character(*),           intent(in)    :: path
-    type(key_t),       allocatable :: keys(:)
-    type(group_key_t), allocatable :: known(:)
     integer :: i, k
 
-    allocate (keys, source=key_table())
-    allocate (known, source=group_table())
     do i = 1, size(groups)
       if (errors%count() >= max_problems) return
-      k = find_group(known, groups(i)%name)
+      k = find_group(list%groups, groups(i)%name)
       if (k == 0) then
-        call report_unknown_group(groups(i), known, errors)
+        call report_unknown_group(groups(i), list%groups, errors)
       else
-        if (.not. known(k)%repeats) call report_repeated(groups, i, errors)
-        call check_keys(groups(i), keys, errors)
+        if (.not. list%groups(k)%repeats) call report_repeated(groups, i, errors)
+        call check_keys(groups(i), list%keys, errors)
       end if
     end do
-    do k = 1, size(known)
-      if (known(k)%required .and. count_groups(groups, trim(known(k)%name)) == 0) &
-        call errors%add('group &'//trim(known(k)%name)//' is missing', where=path, &
-                        allowed='it must be there: '//trim(known(k)%meaning))
+    do k = 1, size(list%groups)
+      associate (known => list%groups(k))
+        if (known%required .and. count_groups(groups, trim(known%name)) == 0) &
+          call errors%add('group &'//trim(known%name)//' is missing', where=path, &
+                          allowed='it must be there: '//trim(known%meaning))
+      end associate
     end do
   end subroutine check_groups
 
@@ -282,87 +280,5 @@ contains
     i = group%find(name)
     if (i > 0) is_damaged = group%entries(i)%damaged
   end function is_damaged
-
-  !> A real number: as given, else its default, else `unset`.
-  subroutine take_real(group, key, x)
-    type(namelist_group_t), intent(in)  :: group
-    type(key_t),            intent(in)  :: key
-    real(wp),               intent(out) :: x
-    character(:), allocatable :: problem, text
-
-    x = unset
-    text = first_value(group, key)
-    if (text == '') return
-    call read_number(text, x, problem)
-    if (problem /= '') x = unset
-  end subroutine take_real
-
-  !> A whole number: as given, else its default, else 0.
-  subroutine take_integer(group, key, i)
-    type(namelist_group_t), intent(in)  :: group
-    type(key_t),            intent(in)  :: key
-    integer,                intent(out) :: i
-    character(:), allocatable :: problem
-
-    call read_integer(first_value(group, key), i, problem)
-    if (problem /= '') i = 0
-  end subroutine take_integer
-
-  !> A text: as given, else its default, else empty.
-  subroutine take_text(group, key, text)
-    type(namelist_group_t),    intent(in)  :: group
-    type(key_t),               intent(in)  :: key
-    character(:), allocatable, intent(out) :: text
-
-    text = first_value(group, key)
-  end subroutine take_text
-
-  !> All numbers of a key, size 0 where it is not given.
-  subroutine take_list(group, key, x)
-    type(namelist_group_t), intent(in)  :: group
-    type(key_t),            intent(in)  :: key
-    real(wp), allocatable,  intent(out) :: x(:)
-    type(namelist_entry_t) :: entry
-    character(:), allocatable :: problem
-    integer :: i
-
-    i = group%find(trim(key%name))
-    if (i > 0) entry = group%entries(i)
-    if (i == 0 .or. entry%damaged) then
-      allocate (x(0))
-      return
-    end if
-    allocate (x(size(entry%values)))
-    do i = 1, size(x)
-      call read_number(entry%values(i)%text, x(i), problem)
-    end do
-  end subroutine take_list
-
-  !> A fixed number of numbers, which stay as they are where the key is not given.
-  subroutine take_vector(group, key, x)
-    type(namelist_group_t), intent(in)    :: group
-    type(key_t),            intent(in)    :: key
-    real(wp),               intent(inout) :: x(:)
-    real(wp), allocatable :: given(:)
-
-    call take_list(group, key, given)
-    if (size(given) == size(x)) x = given
-  end subroutine take_vector
-
-  !> The first value of a key as text, else its default; empty where it is damaged.
-  pure function first_value(group, key) result(text)
-    type(namelist_group_t), intent(in) :: group
-    type(key_t),            intent(in) :: key
-    character(:), allocatable :: text
-    integer :: i
-
-    text = ''
-    i = group%find(trim(key%name))
-    if (i == 0) then
-      text = trim(key%default)
-    else if (.not. group%entries(i)%damaged) then
-      text = group%entries(i)%values(1)%text
-    end if
-  end function first_value
 
 end module pd_input_values

@@ -1,16 +1,17 @@
-!> What is said of a group and of a key of an input file, and visitors of keys.
+!> What a key of the input file is, and who visits it.
 !>
-!> `pd_input_types` shows every key with its value to a visitor, in one place. What is done with all
-!> keys is a visitor: reading, listing as used, printing, the reference.
+!> A group of keys is a type with a procedure `visit`, which names each of its keys once: the
+!> component of the value, unit, default, range, sentence. Whatever is done with all keys is a
+!> visitor: reading, listing as used, printing, the reference.
 module pd_keys
   use pd_kinds, only: is_set, unset, wp
   use pd_text, only: integer_text, number_text, quoted_list
   implicit none
   private
 
-  public :: key_t, group_key_t, range_t, key_visitor_t, positive, not_negative
+  public :: key_t, group_key_t, range_t, key_visitor_t
   public :: find_key, find_group, keys_of, allowed_values, words_of
-  public :: kind_real, kind_integer, kind_text, any_count
+  public :: kind_real, kind_integer, kind_text, any_count, positive, not_negative
 
   integer, parameter :: kind_real = 1, kind_integer = 2, kind_text = 3
 
@@ -31,18 +32,19 @@ module pd_keys
   !> asks for a-z, 0-9 and _. Numbers: `count` is how many are due (any_count: one or more).
   type :: key_t
     character(length) :: name = ''
+    character(length) :: group = ''    !! filled by the list of keys
+    integer           :: kind = kind_real
     integer           :: count = 1
     character(length) :: unit = ''
-    character(long)   :: default = ''    !! as it would stand in the file; empty: none
+    character(long)   :: default = ''    !! as in the file, without quotes; empty: none
     character(long)   :: stands_for = '' !! what the reference says of a default that is computed
     logical           :: required = .false.
     type(range_t)     :: range = range_t()
     character(long)   :: choices = ''
     logical           :: is_name = .false.
+    logical           :: needs_effect = .false.   !! refused where it would have none
     character(long)   :: also = ''       !! what else must hold, for the reference
     character(long)   :: meaning = ''
-    character(length) :: group = ''      !! set, as is the kind, by who collects keys
-    integer           :: kind = kind_real
   end type key_t
 
   type :: group_key_t
@@ -50,63 +52,120 @@ module pd_keys
     logical           :: required = .false.
     logical           :: repeats = .false.
     character(long)   :: meaning = ''
-    integer           :: number = 1      !! of this one among `of` groups of this name
-    integer           :: of = 1
   end type group_key_t
 
-  !> Sees every group, and after it every key with the place of its value.
+  !> Something that is done with every key. The groups call `group`, then the `_key` procedures for
+  !> their keys; a visitor says in the `take_` procedures what it does with each kind.
   type, abstract :: key_visitor_t
   contains
-    procedure(group_of), deferred :: group
-    procedure(text_of), deferred :: text
-    procedure(number_of), deferred :: number
-    procedure(whole_of), deferred :: whole
-    procedure(numbers_of), deferred :: numbers
-    procedure(list_of), deferred :: list
+    procedure, non_overridable :: real_key
+    procedure, non_overridable :: integer_key
+    procedure, non_overridable :: text_key
+    procedure, non_overridable :: list_key
+    procedure, non_overridable :: vector_key
+    procedure(group_i),   deferred :: group
+    procedure(real_i),    deferred :: take_real
+    procedure(integer_i), deferred :: take_integer
+    procedure(text_i),    deferred :: take_text
+    procedure(list_i),    deferred :: take_list
+    procedure(vector_i),  deferred :: take_vector
   end type key_visitor_t
 
   abstract interface
-    !> The keys that follow belong to this group.
-    subroutine group_of(self, about)
+    subroutine group_i(self, about)
       import :: group_key_t, key_visitor_t
       class(key_visitor_t), intent(inout) :: self
       type(group_key_t),    intent(in)    :: about
-    end subroutine group_of
-    subroutine text_of(self, key, value)
+    end subroutine group_i
+
+    subroutine real_i(self, key, x)
+      import :: key_t, key_visitor_t, wp
+      class(key_visitor_t), intent(inout) :: self
+      type(key_t),          intent(in)    :: key
+      real(wp),             intent(inout) :: x
+    end subroutine real_i
+
+    subroutine integer_i(self, key, i)
+      import :: key_t, key_visitor_t
+      class(key_visitor_t), intent(inout) :: self
+      type(key_t),          intent(in)    :: key
+      integer,              intent(inout) :: i
+    end subroutine integer_i
+
+    subroutine text_i(self, key, text)
       import :: key_t, key_visitor_t
       class(key_visitor_t),      intent(inout) :: self
       type(key_t),               intent(in)    :: key
-      character(:), allocatable, intent(inout) :: value
-    end subroutine text_of
-    subroutine number_of(self, key, value)
-      import :: key_t, key_visitor_t, wp
-      class(key_visitor_t), intent(inout) :: self
-      type(key_t),          intent(in)    :: key
-      real(wp),             intent(inout) :: value
-    end subroutine number_of
-    subroutine whole_of(self, key, value)
-      import :: key_t, key_visitor_t
-      class(key_visitor_t), intent(inout) :: self
-      type(key_t),          intent(in)    :: key
-      integer,              intent(inout) :: value
-    end subroutine whole_of
-    !> A fixed number of numbers.
-    subroutine numbers_of(self, key, values)
-      import :: key_t, key_visitor_t, wp
-      class(key_visitor_t), intent(inout) :: self
-      type(key_t),          intent(in)    :: key
-      real(wp),             intent(inout) :: values(:)
-    end subroutine numbers_of
-    !> Numbers that may be absent: size 0.
-    subroutine list_of(self, key, values)
+      character(:), allocatable, intent(inout) :: text
+    end subroutine text_i
+
+    subroutine list_i(self, key, x)
       import :: key_t, key_visitor_t, wp
       class(key_visitor_t),  intent(inout) :: self
       type(key_t),           intent(in)    :: key
-      real(wp), allocatable, intent(inout) :: values(:)
-    end subroutine list_of
+      real(wp), allocatable, intent(inout) :: x(:)
+    end subroutine list_i
+
+    subroutine vector_i(self, key, x)
+      import :: key_t, key_visitor_t, wp
+      class(key_visitor_t), intent(inout) :: self
+      type(key_t),          intent(in)    :: key
+      real(wp),             intent(inout) :: x(:)
+    end subroutine vector_i
   end interface
 
 contains
+
+  !> A key that holds one real number.
+  subroutine real_key(self, key, x)
+    class(key_visitor_t), intent(inout) :: self
+    type(key_t),          intent(in)    :: key
+    real(wp),             intent(inout) :: x
+
+    call self%take_real(key, x)
+  end subroutine real_key
+
+  !> A key that holds one whole number.
+  subroutine integer_key(self, key, i)
+    class(key_visitor_t), intent(inout) :: self
+    type(key_t),          intent(in)    :: key
+    integer,              intent(inout) :: i
+    type(key_t) :: whole
+
+    whole = key
+    whole%kind = kind_integer
+    call self%take_integer(whole, i)
+  end subroutine integer_key
+
+  !> A key that holds a text.
+  subroutine text_key(self, key, text)
+    class(key_visitor_t),      intent(inout) :: self
+    type(key_t),               intent(in)    :: key
+    character(:), allocatable, intent(inout) :: text
+    type(key_t) :: worded
+
+    worded = key
+    worded%kind = kind_text
+    call self%take_text(worded, text)
+  end subroutine text_key
+
+  !> A key that holds a list of numbers, of size 0 where it is not given.
+  subroutine list_key(self, key, x)
+    class(key_visitor_t),  intent(inout) :: self
+    type(key_t),           intent(in)    :: key
+    real(wp), allocatable, intent(inout) :: x(:)
+
+    call self%take_list(key, x)
+  end subroutine list_key
+
+  !> A key that always holds as many numbers as `x`.
+  subroutine vector_key(self, key, x)
+    class(key_visitor_t), intent(inout) :: self
+    type(key_t),          intent(in)    :: key
+    real(wp),             intent(inout) :: x(:)
+
+    call self%take_vector(key, x)
+  end subroutine vector_key
 
   !> Index of a key in the table, 0 where there is none.
   pure integer function find_key(keys, group, name) result(i)

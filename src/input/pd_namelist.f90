@@ -38,6 +38,7 @@ module pd_namelist
     character(:), allocatable :: key                   !! in small letters
     character(:), allocatable :: source                !! where it stands, if not in the file
     integer :: line = 0
+    character(:), allocatable :: place                 !! where it stands, if not in the file
     logical :: damaged = .false.
     type(namelist_value_t), allocatable :: values(:)
   end type namelist_entry_t
@@ -153,7 +154,13 @@ contains
     line = group%line
     if (present(key)) then
       i = group%find(key)
-      if (i > 0) line = group%entries(i)%line
+      if (i > 0) then
+        if (allocated(group%entries(i)%place)) then
+          place = group%entries(i)%place
+          return
+        end if
+        line = group%entries(i)%line
+      end if
     end if
     place = group%file
     if (present(key)) then
@@ -349,21 +356,18 @@ contains
       call scanner%skip_blank()
       start = scanner%at
       start_line = scanner%line
-      select case (scanner%next())
-      case ('', '/', '&')
+      if (scanner%next() == '' .or. scanner%next() == '/' .or. scanner%next() == '&') then
         exit
-      case (',')
+      else if (scanner%next() == ',') then
         if (comma_before) call damage('has an empty value', allowed='a value between commas')
         comma_before = .true.
         scanner%at = scanner%at + 1
         cycle
-      case ('=')
+      else if (scanner%next() == '=') then
         call damage('has one = too many')
         scanner%at = scanner%at + 1
         cycle
-      case default   ! a value, or the next key
-        continue
-      end select
+      end if
       if (index(quotes, scanner%next()) == 0) then
         word = scanner%token()
         starts_key = scanner%is_before_equals()

@@ -5,138 +5,165 @@ module pd_used_values
   use pd_input_types, only: input_t
   use pd_keys, only: group_key_t, key_t, key_visitor_t
   use pd_kinds, only: wp
-  use pd_text, only: integer_text, number_text, numbers_text, read_number, shortened
+  use pd_text, only: integer_text, number_text, read_number, shortened
   implicit none
   private
 
-  public :: used_values, compare_used
+  public :: used_values, compare_used, used_list_t, numbers_text
 
   type :: line_t
     character(:), allocatable :: text
   end type line_t
 
-  !> Collects a line per key. Groups that may stand several times carry their name, or their number
-  !> where they have none: boundary(top).velocity, body(1).x_min; a material that stands alone has
-  !> no need of it.
-  type, extends(key_visitor_t) :: lister_t
-    type(line_t), allocatable :: lines(:)
+  !> Visitor that collects a line for each key.
+  type, extends(key_visitor_t) :: used_list_t
+    type(line_t), allocatable :: list(:)
     integer :: n = 0
-    type(group_key_t) :: here
-    character(:), allocatable :: stem
+    type(group_key_t) :: about                    !! the present group
+    integer :: k = 0                              !! it is the k-th of its name
+    character(:), allocatable :: label            !! 'run', 'body(1)', 'boundary(top)'
   contains
-    procedure :: group => list_group
-    procedure :: text => list_text
-    procedure :: number => list_number
-    procedure :: whole => list_whole
-    procedure :: numbers => list_numbers
-    procedure :: list => list_list
+    procedure :: group => begin_group
+    procedure :: take_real => list_real
+    procedure :: take_integer => list_integer
+    procedure :: take_text => list_text
+    procedure :: take_list => list_numbers
+    procedure :: take_vector => list_vector
     procedure, private :: add
-  end type lister_t
+    procedure :: lines
+  end type used_list_t
 
   character(*), parameter :: equals = ' = '
 
 contains
 
   !> All values as used, defaults included, in the order of the reference; numbers with as many
-  !> digits as read back to the same bits, 'none' where there is no value.
+  !> digits as read back to the same bits, 'none' where there is no value. Bodies carry their
+  !> number, boundaries, pressures and named materials their name: body(1).x_min,
+  !> boundary(top).velocity, material(clay).density.
   function used_values(input) result(values)
     type(input_t), intent(in) :: input
     character(:), allocatable :: values(:)
-    type(input_t)  :: shown
-    type(lister_t) :: lister
-    integer :: i, longest
+    type(input_t)     :: visited
+    type(used_list_t) :: used
 
-    shown = input   ! a visitor may change what it sees; this one does not
-    allocate (lister%lines(64))
-    call shown%visit(lister)
-    longest = 1
-    do i = 1, lister%n
-      longest = max(longest, len(lister%lines(i)%text))
-    end do
-    allocate (character(longest) :: values(lister%n))
-    do i = 1, lister%n
-      values(i) = lister%lines(i)%text
-    end do
+    visited = input
+    call visited%visit(used)
+    allocate (values, source=used%lines())
   end function used_values
 
-  subroutine list_group(self, about)
-    class(lister_t),   intent(inout) :: self
-    type(group_key_t), intent(in)    :: about
+  !> What has been collected.
+  function lines(self) result(values)
+    class(used_list_t), intent(in) :: self
+    character(:), allocatable :: values(:)
+    integer :: i, longest
 
-    self%here = about
-    self%stem = trim(about%name)//'.'
-    if (about%repeats) self%stem = trim(about%name)//'('//integer_text(about%number)//').'
-    if (about%name == 'material' .and. about%of == 1) self%stem = 'material.'
-  end subroutine list_group
+    longest = 1
+    do i = 1, self%n
+      longest = max(longest, len(self%list(i)%text))
+    end do
+    allocate (character(longest) :: values(self%n))
+    do i = 1, self%n
+      values(i) = self%list(i)%text
+    end do
+  end function lines
 
-  !> A name becomes part of the keys that follow.
-  subroutine list_text(self, key, value)
-    class(lister_t),           intent(inout) :: self
-    type(key_t),               intent(in)    :: key
-    character(:), allocatable, intent(inout) :: value
+  !> A group that may stand several times carries its number, until its name is known.
+  subroutine begin_group(self, about)
+    class(used_list_t), intent(inout) :: self
+    type(group_key_t),  intent(in)    :: about
 
-    if (key%name == 'name' .and. self%here%repeats) then
-      if (index(self%stem, '(') > 0) self%stem = trim(self%here%name)//'('//value//').'
-    else if (value == '') then
-      call self%add(key, 'none')
-    else
-      call self%add(key, value)
-    end if
-  end subroutine list_text
-
-  subroutine list_number(self, key, value)
-    class(lister_t), intent(inout) :: self
-    type(key_t),     intent(in)    :: key
-    real(wp),        intent(inout) :: value
-
-    call self%add(key, number_text(value))
-  end subroutine list_number
-
-  subroutine list_whole(self, key, value)
-    class(lister_t), intent(inout) :: self
-    type(key_t),     intent(in)    :: key
-    integer,         intent(inout) :: value
-
-    call self%add(key, integer_text(value))
-  end subroutine list_whole
-
-  subroutine list_numbers(self, key, values)
-    class(lister_t), intent(inout) :: self
-    type(key_t),     intent(in)    :: key
-    real(wp),        intent(inout) :: values(:)
-
-    call self%add(key, numbers_text(values))
-  end subroutine list_numbers
-
-  subroutine list_list(self, key, values)
-    class(lister_t),       intent(inout) :: self
-    type(key_t),           intent(in)    :: key
-    real(wp), allocatable, intent(inout) :: values(:)
-
-    if (size(values) == 0) then
-      call self%add(key, 'none')
-    else
-      call self%add(key, numbers_text(values))
-    end if
-  end subroutine list_list
+    if (self%about%name /= about%name) self%k = 0
+    self%k = self%k + 1
+    self%about = about
+    self%label = trim(about%name)
+    if (about%repeats) self%label = self%label//'('//integer_text(self%k)//')'
+  end subroutine begin_group
 
   subroutine add(self, key, value)
-    class(lister_t), intent(inout) :: self
-    type(key_t),     intent(in)    :: key
-    character(*),    intent(in)    :: value
+    class(used_list_t), intent(inout) :: self
+    character(*),       intent(in)    :: key, value
     type(line_t), allocatable :: longer(:)
     integer :: i
 
-    if (self%n == size(self%lines)) then
-      allocate (longer(2 * self%n))
+    if (.not. allocated(self%list)) allocate (self%list(64))
+    if (self%n == size(self%list)) then
+      allocate (longer(2*self%n))
       do i = 1, self%n
-        call move_alloc(self%lines(i)%text, longer(i)%text)
+        call move_alloc(self%list(i)%text, longer(i)%text)
       end do
-      call move_alloc(longer, self%lines)
+      call move_alloc(longer, self%list)
     end if
     self%n = self%n + 1
-    self%lines(self%n)%text = self%stem//trim(key%name)//equals//value
+    self%list(self%n)%text = self%label//'.'//key//equals//value
   end subroutine add
+
+  !> The name of a group that may stand several times is its label, and no line of its own. A name
+  !> that is the default labels nothing: 'material.density', where there is but one material.
+  subroutine list_text(self, key, text)
+    class(used_list_t),        intent(inout) :: self
+    type(key_t),               intent(in)    :: key
+    character(:), allocatable, intent(inout) :: text
+
+    if (key%name == 'name' .and. self%about%repeats) then
+      self%label = trim(self%about%name)
+      if (text /= key%default) self%label = self%label//'('//text//')'
+    else if (text == '') then
+      call self%add(trim(key%name), 'none')
+    else
+      call self%add(trim(key%name), text)
+    end if
+  end subroutine list_text
+
+  subroutine list_real(self, key, x)
+    class(used_list_t), intent(inout) :: self
+    type(key_t),        intent(in)    :: key
+    real(wp),           intent(inout) :: x
+
+    call self%add(trim(key%name), number_text(x))
+  end subroutine list_real
+
+  subroutine list_integer(self, key, i)
+    class(used_list_t), intent(inout) :: self
+    type(key_t),        intent(in)    :: key
+    integer,            intent(inout) :: i
+
+    call self%add(trim(key%name), integer_text(i))
+  end subroutine list_integer
+
+  subroutine list_numbers(self, key, x)
+    class(used_list_t),    intent(inout) :: self
+    type(key_t),           intent(in)    :: key
+    real(wp), allocatable, intent(inout) :: x(:)
+
+    call self%add(trim(key%name), numbers_text(x))
+  end subroutine list_numbers
+
+  subroutine list_vector(self, key, x)
+    class(used_list_t), intent(inout) :: self
+    type(key_t),        intent(in)    :: key
+    real(wp),           intent(inout) :: x(:)
+
+    call self%add(trim(key%name), numbers_text(x))
+  end subroutine list_vector
+
+  !> Numbers with commas between them; 'none' where there are none.
+  pure function numbers_text(x) result(text)
+    real(wp), intent(in) :: x(:)
+    character(:), allocatable :: text, number
+    character(26*size(x)) :: buffer
+    integer :: i, n
+
+    n = 0
+    do i = 1, size(x)
+      number = number_text(x(i))
+      if (i < size(x)) number = number//', '
+      buffer(n + 1:n + len(number)) = number
+      n = n + len(number)
+    end do
+    text = buffer(:n)
+    if (n == 0) text = 'none'
+  end function numbers_text
 
   !> Name every value in which a run that is to go on differs from the run so far.
   !>

@@ -15,8 +15,8 @@ module pd_record
   use pd_input, only: compare_used, used_values
   use pd_input_types, only: input_t
   use pd_kinds, only: wp
-  use pd_model, only: model_t
   use pd_ledger, only: ledger_t
+  use pd_model, only: model_t
   use pd_observe, only: column_t, moment_at, moment_t, observation_t, observe
   use pd_progress, only: close_progress, open_progress, progress_t, say, show_progress, status_t
   use pd_result, only: add_row, create_result, finish_result, places_t, result_exists, result_t, &
@@ -262,8 +262,8 @@ contains
     call write_checkpoint(record%stem, checkpoint, kept, errors)
   end subroutine save_checkpoint
 
-  !> Read the newest checkpoint and compare its input with the present one. The state has one row per
-  !> point.
+  !> Read the newest checkpoint and compare its input with the present one. The state has one row
+  !> per point.
   !>
   !> Errors, `file_errors`: no checkpoint that can be read; `input_errors`: values that differ.
   subroutine load_checkpoint(input, checkpoint, state, ledger, warning, file_errors, input_errors)

@@ -7,7 +7,6 @@ module models
   use pd_kinds, only: wp
   use pd_model, only: model_t
   use pd_schedule, only: schedule_t
-  use pd_settings, only: setting_t
   use pd_setup, only: set_up_model
   use pd_setup_body, only: set_up_body
   use pd_setup_schedule, only: set_up_schedule
@@ -47,14 +46,13 @@ contains
     character(*), intent(in) :: groups
     real(wp),     intent(in), optional :: time_step
     type(made_t) :: made
-    type(setting_t) :: no_settings(0)
     integer :: unit
 
     if (present(time_step)) made%clock%time_step = time_step
     open (newunit=unit, file='case.nml', access='stream', status='replace', action='write')
     write (unit) groups//achar(10)
     close (unit)
-    call read_input('case.nml', no_settings, made%input, made%errors)
+    call read_input('case.nml', made%input, made%errors)
     if (made%errors%count() > 0) return
     call set_up_body(made%input, made%model%body, made%warnings, made%errors, made%errors)
     if (made%errors%count() > 0) return

@@ -1,0 +1,220 @@
+!> Values that the command line puts in place of those of the file: --set group.key=value.
+!>
+!> The group may be told from others of its name by its own name or by its number:
+!> boundary.top.velocity, body.2.x_max. What is set then stands among the values of the file, and
+!> goes through the same checks.
+module pd_input_settings
+  use pd_errors, only: error_list_t
+  use pd_input_values, only: count_groups, did_you_mean
+  use pd_key_list, only: key_list_t
+  use pd_keys, only: allowed_values, find_group, find_key, kind_text
+  use pd_namelist, only: namelist_entry_t, namelist_group_t, scan_namelist
+  use pd_text, only: integer_text, lower_case, quoted_list, read_integer, shortened
+  implicit none
+  private
+
+  public :: setting_t, apply_settings
+
+  !> One 'group.key=value'.
+  type :: setting_t
+    character(:), allocatable :: text
+  end type setting_t
+
+  !> The parts of one setting. `which`: empty, a name or a number; `place` names it in messages.
+  type :: parts_t
+    character(:), allocatable :: place, group, which, key, value
+  end type parts_t
+
+contains
+
+  !> Put the settings into the groups of the file, one after the other: the last one counts.
+  !>
+  !> Errors: no group.key=value, a group or key that there is not, a group that the file does not
+  !> have, or has several times without saying which, a value that cannot be read.
+  subroutine apply_settings(settings, list, path, groups, errors)
+    type(setting_t),                     intent(in)    :: settings(:)
+    type(key_list_t),                    intent(in)    :: list         !! what there is
+    character(*),                        intent(in)    :: path         !! of the input file
+    type(namelist_group_t), allocatable, intent(inout) :: groups(:)
+    type(error_list_t),                  intent(inout) :: errors
+    type(namelist_entry_t) :: entry
+    type(parts_t) :: parts
+    integer :: before, i, s
+
+    do s = 1, size(settings)
+      before = errors%count()
+      call split(settings(s)%text, parts, errors)
+      if (errors%count() == before) call find_place(parts, list, path, groups, i, errors)
+      if (errors%count() == before) call read_value(parts, list, entry, errors)
+      if (errors%count() == before) call replace(groups(i), entry)
+    end do
+  end subroutine apply_settings
+
+  !> group.key=value or group.which.key=value
+  subroutine split(text, parts, errors)
+    character(*),       intent(in)    :: text
+    type(parts_t),      intent(out)   :: parts
+    type(error_list_t), intent(inout) :: errors
+    character(:), allocatable :: name
+    integer :: equals, first, last
+
+    parts%place = '--set '//shortened(text)
+    equals = index(text, '=')
+    name = ''
+    if (equals > 0) name = lower_case(trim(adjustl(text(:equals - 1))))
+    first = index(name, '.')
+    last = index(name, '.', back=.true.)
+    if (first < 2 .or. last == len(name)) then
+      call errors%add('no key with a value', where=parts%place, &
+                      allowed='group.key=value or group.name.key=value')
+      return
+    end if
+    parts%group = name(:first - 1)
+    parts%which = name(first + 1:last - 1)
+    parts%key = name(last + 1:)
+    parts%value = trim(adjustl(text(equals + 1:)))
+    if (parts%value == '') call errors%add('the value is missing', where=parts%place)
+  end subroutine split
+
+  !> The index of the group; one that stands at most once is added where the file lacks it.
+  subroutine find_place(parts, list, path, groups, i, errors)
+    type(parts_t),                       intent(in)    :: parts
+    type(key_list_t),                    intent(in)    :: list
+    character(*),                        intent(in)    :: path
+    type(namelist_group_t), allocatable, intent(inout) :: groups(:)
+    integer,                             intent(out)   :: i
+    type(error_list_t),                  intent(inout) :: errors
+    integer :: known, n
+
+    i = 0
+    known = find_group(list%groups, parts%group)
+    if (known == 0) then
+      call errors%add('unknown group'//did_you_mean(parts%group, list%groups%name), &
+                      where=parts%place, found=shortened(parts%group), &
+                      allowed=quoted_list(list%groups%name, bare=.true.))
+      return
+    end if
+    n = count_groups(groups, parts%group)
+    if (parts%which /= '') then
+      i = group_of(groups, parts%group, parts%which)
+      if (i == 0) call errors%add('the file has no such group', where=parts%place, &
+        found=shortened(parts%which), allowed='a name of &'//parts%group//' or 1 to '// &
+        integer_text(n))
+    else if (n == 1) then
+      i = group_of(groups, parts%group, '1')
+    else if (n > 1) then
+      call errors%add('the file has several groups of this name', where=parts%place, &
+        found=integer_text(n)//' groups &'//parts%group, &
+        allowed=parts%group//'.name.'//parts%key//' or '//parts%group//'.number.'//parts%key)
+    else if (list%groups(known)%repeats) then
+      call errors%add('the file has no group &'//parts%group, where=parts%place)
+    else
+      call append(groups, parts%group, path)
+      i = size(groups)
+    end if
+  end subroutine find_place
+
+  !> The group that has this name, else the one of this number; 0 where there is none.
+  pure integer function group_of(groups, name, which) result(i)
+    type(namelist_group_t), intent(in) :: groups(:)
+    character(*),           intent(in) :: name, which
+    character(:), allocatable :: problem
+    integer :: e, k, n
+
+    do i = 1, size(groups)
+      if (groups(i)%name /= name) cycle
+      e = groups(i)%find('name')
+      if (e == 0) cycle
+      if (size(groups(i)%entries(e)%values) == 0) cycle
+      if (groups(i)%entries(e)%values(1)%text == which) return
+    end do
+    call read_integer(which, k, problem)
+    if (problem /= '') k = 0
+    n = 0
+    do i = 1, size(groups)
+      if (groups(i)%name == name) n = n + 1
+      if (groups(i)%name == name .and. n == k) return
+    end do
+    i = 0
+  end function group_of
+
+  subroutine append(groups, name, path)
+    type(namelist_group_t), allocatable, intent(inout) :: groups(:)
+    character(*),                        intent(in)    :: name, path
+    type(namelist_group_t), allocatable :: more(:)
+    integer :: i, n
+
+    n = size(groups)
+    allocate (more(n + 1))
+    do i = 1, n
+      more(i) = groups(i)
+    end do
+    more(n + 1)%file = path
+    more(n + 1)%name = name
+    allocate (more(n + 1)%entries(0))
+    call move_alloc(more, groups)
+  end subroutine append
+
+  !> The values as they would stand in the file; the shell has taken the quotes of a text.
+  subroutine read_value(parts, list, entry, errors)
+    type(parts_t),          intent(in)    :: parts
+    type(key_list_t),       intent(in)    :: list
+    type(namelist_entry_t), intent(out)   :: entry
+    type(error_list_t),     intent(inout) :: errors
+    type(namelist_group_t), allocatable :: scanned(:)
+    type(error_list_t) :: problems
+    integer :: k
+
+    entry%key = parts%key
+    entry%place = parts%place
+    k = find_key(list%keys, parts%group, parts%key)
+    if (k == 0) then   ! check_groups names it
+      call take_as_text(parts%value, entry)
+      return
+    end if
+    if (list%keys(k)%kind == kind_text .and. verify(parts%value(1:1), '''"') > 0) then
+      call take_as_text(parts%value, entry)
+      return
+    end if
+    call scan_namelist(parts%place, '&a b = '//parts%value//' /', scanned, problems)
+    if (problems%count() == 0 .and. size(scanned) == 1) then
+      if (size(scanned(1)%entries) == 1) then
+        entry%values = scanned(1)%entries(1)%values
+        return
+      end if
+    end if
+    call errors%add('the value cannot be read', where=parts%place, found=shortened(parts%value), &
+                    allowed=allowed_values(list%keys(k)))
+  end subroutine read_value
+
+  subroutine take_as_text(text, entry)
+    character(*),           intent(in)    :: text
+    type(namelist_entry_t), intent(inout) :: entry
+
+    allocate (entry%values(1))
+    entry%values(1)%text = text
+    entry%values(1)%quoted = .true.
+  end subroutine take_as_text
+
+  !> In place of the entry of this key, or beside the others.
+  subroutine replace(group, entry)
+    type(namelist_group_t), intent(inout) :: group
+    type(namelist_entry_t), intent(in)    :: entry
+    type(namelist_entry_t), allocatable :: more(:)
+    integer :: i, n
+
+    i = group%find(entry%key)
+    if (i > 0) then
+      group%entries(i) = entry
+      return
+    end if
+    n = size(group%entries)
+    allocate (more(n + 1))
+    do i = 1, n
+      more(i) = group%entries(i)
+    end do
+    more(n + 1) = entry
+    call move_alloc(more, group%entries)
+  end subroutine replace
+
+end module pd_input_settings

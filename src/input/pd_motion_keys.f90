@@ -1,0 +1,75 @@
+!> Groups of the input file: the control, the time step and the end.
+!>
+!> A key is a component here and a line in the procedure that visits it: nothing else lists it.
+module pd_motion_keys
+  use pd_keys, only: group_key_t, key_t, key_visitor_t, not_negative, positive, range_t
+  use pd_kinds, only: unset, wp
+  implicit none
+  private
+
+  public :: stabilisation_input_t, integration_input_t
+
+  type :: stabilisation_input_t
+    character(:), allocatable :: method
+    real(wp) :: factor = 0.0_wp
+  contains
+    procedure :: visit => visit_stabilisation
+  end type stabilisation_input_t
+
+  type :: integration_input_t
+    real(wp) :: end_time = unset                       !! [s]
+    real(wp) :: final_strain = unset
+    character(:), allocatable :: time_step_rule
+    real(wp) :: time_step = unset                      !! [s]
+    real(wp) :: safety = 0.9_wp
+    real(wp) :: damping = 0.0_wp                       !! C [kg/(m^3 s)]
+    character(:), allocatable :: damping_frame
+  contains
+    procedure :: visit => visit_integration
+  end type integration_input_t
+
+contains
+
+  subroutine visit_stabilisation(self, visitor)
+    class(stabilisation_input_t), intent(inout) :: self
+    class(key_visitor_t),         intent(inout) :: visitor
+
+    call visitor%group(group_key_t('stabilisation', meaning='control of zero-energy modes'))
+    call visitor%text_key(key_t('method', default='none', choices='none silling', &
+      meaning='none, or the control of Silling (2017)'), self%method)
+    call visitor%real_key(key_t('factor', unit='1', default='0.0', range=not_negative, &
+      also='above 0 for silling, else 0', meaning='strength of the control, g'), self%factor)
+  end subroutine visit_stabilisation
+
+  subroutine visit_integration(self, visitor)
+    class(integration_input_t), intent(inout) :: self
+    class(key_visitor_t),       intent(inout) :: visitor
+
+    call visitor%group(group_key_t('integration', required=.true., &
+      meaning='end of the run, time step and damping'))
+    call visitor%real_key(key_t('end_time', unit='s', range=positive, &
+      also='this or final_strain, never both', meaning='end of the run'), self%end_time)
+    call visitor%real_key(key_t('final_strain', unit='1', range=positive, &
+      also='only with platens', meaning='nominal strain at which the run ends'), &
+      self%final_strain)
+    call visitor%text_key(key_t('time_step_rule', default='spectral', &
+      choices='courant spectral fixed', &
+      meaning='courant: safety * spacing / c_p; spectral: safety * 2 / (largest frequency); ' &
+      //'fixed: time_step'), self%time_step_rule)
+    call visitor%real_key(key_t('time_step', unit='s', range=positive, &
+      also='needed for the rule fixed, else not allowed', meaning='the time step'), &
+      self%time_step)
+    call visitor%real_key(key_t('safety', unit='1', default='0.9', needs_effect=.true., &
+      range=range_t(0.0_wp, 10.0_wp, .true., .false.), &
+      also='below 1 for the rule spectral; not with fixed', &
+      meaning='factor on the time step of the rule'), self%safety)
+    call visitor%real_key(key_t('damping', unit='kg/(m^3 s)', default='0.0', range=not_negative, &
+      meaning='force per volume and velocity against the motion, C'), self%damping)
+    call visitor%text_key(key_t('damping_frame', default='rest', choices='rest platens', &
+      also='platens: only with platens', &
+      meaning='rest: damping against rest, the body starts at rest; platens: against the ' &
+      //'affine velocity between the platens, with which the body also starts'), &
+      self%damping_frame)
+  end subroutine visit_integration
+
+end module pd_motion_keys
