@@ -21,7 +21,7 @@ LAYERS = {
     "measure": {"numpy", "matplotlib.tri"},
     "draw": {"numpy", "matplotlib", "PIL"},
     "study": {"numpy", "matplotlib", "tomli"},
-    "report": {"PIL", "tomli"},
+    "report": {"PIL", "jinja2", "markupsafe", "tomli"},
     "cli": {"numpy"},
     "__main__": set(),
     "__init__": set(),
