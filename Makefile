@@ -8,6 +8,7 @@ layers := base system input body operators material loads motion setup output ap
 BUILD  = opt
 MARCH  = native
 PREFIX = /usr/local
+ALIGNED = 1
 
 ifneq ($(filter default undefined,$(origin FC)),)
   FC = gfortran
@@ -51,7 +52,7 @@ build    := build/$(BUILD)
 studies := fig3a fig3b fig4 fig5 horizon loading size softening influence heterogeneity
 .PHONY: all program objects post debug units demo demo-quick test lint verify \
   layers setup install help clean distclean figures $(studies) \
-  report report-view
+  report report-view site bench
 .DEFAULT_GOAL := all
 
 help_width := 13
@@ -114,6 +115,10 @@ lint:              ## compiler warnings as errors, Fortran and Python linters, l
 	@sh tools/setup.sh lint
 	@sh tools/lint.sh '$(MAKE)' $(parallel)
 
+site:              ## the documents and a page for every module, in build/site/index.html
+	@sh tools/setup.sh site
+	@$(venv)/bin/python tools/make_site.py build/site
+
 verify:            ## compare computed values with closed forms, printed as a table
 	@sh tools/setup.sh test
 	@$(submake) $(parallel) program
@@ -122,6 +127,7 @@ verify:            ## compare computed values with closed forms, printed as a ta
 bench:             ## measure the speed on this machine; PUBLISH=1: into doc/performance.md
 	@sh tools/setup.sh test
 	@$(submake) $(parallel) program build/opt/bench/machine
+	@$(submake) $(parallel) ALIGNED=0 build=build/unaligned program=build/unaligned/perigeo program
 	@$(venv)/bin/python tests/bench/bench.py $(if $(PUBLISH),--publish)
 
 install: program   ## copy the program to PREFIX/bin (PREFIX=/usr/local)
@@ -142,6 +148,7 @@ help:              ## list the targets
 	@echo '  FFLAGS=-O2        optimisation flags (-O3)'
 	@echo '  BUILD=debug       with make test: use the program with all checks'
 	@echo '  FC=, H5FC=        Fortran compiler (gfortran) and HDF5 wrapper (h5fc)'
+	@echo '  ALIGNED=0         arrays begin where malloc puts them, not at a line of the cache'
 	@echo '  PFUNIT_DIR=DIR    with make test: use the pFUnit installed in DIR'
 	@echo '  NO_INSTALL=1      never install anything'
 	@echo '  V=1               show the commands'
@@ -149,7 +156,7 @@ help:              ## list the targets
 # ---------------------------------------------------------------------------------- compiling
 # The rest needs the compiler and HDF5, which `make demo` may have to install first.
 ifneq ($(filter-out setup demo demo-quick test debug lint verify layers help clean \
-  distclean figures $(studies) report report-view,\
+  distclean figures $(studies) report report-view site bench,\
   $(or $(MAKECMDGOALS),all)),)
 
 ifeq ($(shell command -v $(firstword $(FC)) 2>/dev/null),)
@@ -167,9 +174,14 @@ ifeq ($(hdf5_link),)
   $(error no HDF5 library for Fortran: run tools/setup.sh, which installs or names what is missing)
 endif
 
-# Arrays at the start of a cache line (src/system/pd_memory.f90), where linker and C library can do it.
-aligned := $(shell mkdir -p $(build)/try; echo end | $(FC) -J$(build)/try src/system/pd_memory.f90 \
-  -x f95 - -Wl,--wrap=malloc -o $(build)/try/link 2>/dev/null && echo -Wl,--wrap=malloc)
+# Arrays at the start of a cache line (src/system/pd_memory.f90), where linker and C library can
+# do it. What it gains is in doc/performance.md; ALIGNED=0 goes without.
+# Folders come first: what make has looked for and not found, it does not look for again.
+update := $(shell mkdir -p $(build)/try $(build)/unit bin)
+ifneq ($(ALIGNED),0)
+  aligned := $(shell echo end | $(FC) -J$(build)/try src/system/pd_memory.f90 -x f95 - \
+    -Wl,--wrap=malloc -o $(build)/try/link 2>/dev/null && echo -Wl,--wrap=malloc)
+endif
 left_out := $(if $(aligned),,pd_memory)
 
 sources := $(filter-out $(left_out:%=src/system/%.f90),$(wildcard $(layers:%=src/%/*.f90)))
@@ -179,8 +191,8 @@ compile  = $(FC) $(flags) $(warnings) $(hdf5_compile) -J$(build)
 say      = $(if $(V),,@echo '  $(1)';)
 
 # These files change only when their contents do: what everything depends on, and the version.
-update := $(shell mkdir -p $(build)/unit bin; \
-  echo '$(compile) $(hdf5_link) $(aligned)' | sh tools/update_file.sh $(build)/flags; \
+update := $(shell echo '$(compile) $(hdf5_link) $(aligned)' | \
+  sh tools/update_file.sh $(build)/flags; \
   sh tools/version.sh '$(FC)' '$(flags)' | sh tools/update_file.sh $(build)/pd_version.f90)
 
 program: $(if $(wildcard src/app/perigeo.f90),$(program),objects)

@@ -5,6 +5,9 @@
 # They come from HDF5's compiler wrapper: $H5FC, or h5fc, or h5pfc. The shared libraries are taken
 # where there are any: the static ones would ask for the development files of all their own
 # libraries. Prints nothing where there is no wrapper.
+#
+# Lists of flags are split into words on purpose.
+# shellcheck disable=SC2086
 what=$1
 compiler=$2
 for wrapper in ${H5FC:-h5fc h5pfc}; do

@@ -24,55 +24,53 @@ stage() {
 }
 
 compiler_warnings() {
+  # No word where there is no -j; $make may be several.
+  # shellcheck disable=SC2086
   $make --no-print-directory BUILD=lint PFUNIT_DIR= $parallel -k objects units
 }
 
 layers() {
+  # One word for each layer.
+  # shellcheck disable=SC2046
   sh tools/check_layers.sh --self-test &&
-    sh tools/check_layers.sh src $($make -s --no-print-directory layers)
+    sh tools/check_layers.sh src tests/unit $($make -s --no-print-directory layers)
 }
 
-# Text files of our own, one a line.
+limits() {
+  $bin/python tools/check_limits.py --self-test && $bin/python tools/check_limits.py
+}
+
+# Text files of our own, one on each line.
 text_files() {
   find . \( -name .git -o -name .venv -o -name build -o -name bin -o -name results -o \
     -name '*.egg-info' -o -name '.*_cache' -o -name shared \) -prune -o -type f \
     \( -name '*.f90' -o -name '*.in' -o -name '*.pf' -o -name '*.py' -o -name '*.sh' -o \
     -name '*.awk' -o -name '*.nml' -o -name '*.toml' -o -name '*.md' -o -name '*.cff' -o \
-    -name Makefile -o -path './.ci/run' \) -print
+    -name '*.yaml' -o -name .editorconfig -o -name .codespellrc -o -name Makefile -o \
+    -path './.ci/run' \) -print
 }
 
-# In a suite an assert has to stand on one line, so that Fortran's own limit holds there; a link in
-# a text may be as long as it is.
 layout() {
-  text_files | while read -r file; do
-    awk -v tabs="$(case $file in */Makefile) echo 1 ;; esac)" '
-      BEGIN { limit = ARGV[1] ~ /\.pf$/ ? 132 : 100 }
-      length($0) > limit && FILENAME !~ /\.(md|cff)$/ {
-        print FILENAME ":" FNR ": " length($0) " columns; at most " limit
-        bad = 1
-      }
-      /[ \t\r]$/ { print FILENAME ":" FNR ": blanks at the end of the line"; bad = 1 }
-      /\t/ && !tabs { print FILENAME ":" FNR ": a tab"; bad = 1 }
-      END { exit bad }' "$file" || echo bad >> "$log.bad"
-  done
-  if [ -e "$log.bad" ]; then
-    rm -f "$log.bad"
-    return 1
-  fi
+  text_files | xargs sh tools/check_layout.sh
 }
 
 shell_scripts() {
-  for script in tools/*.sh .ci/run; do
-    bash -n "$script" || return 1
-  done
+  $bin/shellcheck --shell=sh tools/*.sh && $bin/shellcheck .ci/run
+}
+
+# Its settings are in .codespellrc.
+spelling() {
+  text_files | xargs $bin/codespell
 }
 
 echo "Lint"
 stage "compiler warnings" compiler_warnings
 stage "fortitude" $bin/fortitude check --no-show-fixes src tests
 stage "layers" layers
+stage "limits" limits
 stage "layers of perigeo_post" $bin/python tools/check_python_layers.py
 stage "layout of the text" layout
+stage "spelling" spelling
 stage "shell scripts" shell_scripts
 stage "ruff" $bin/ruff check .
 # Only Python: ruff would also lay out the examples in texts.

@@ -1,19 +1,20 @@
-# Put perigeo-post and what it needs into .venv:  sh tools/python_env.sh run|test|lint
+# Put perigeo-post and what it needs into .venv:  sh tools/python_env.sh run|test|lint|site
 #
 #   run   the package itself          test   also what the tests need
-#   lint  also the linters
+#   lint  also the linters            site   what makes the pages of `make site`
 #
 # Says nothing when everything is there already, and then needs no network. Leaves with 1, after a
 # message, where Python or the network is missing. NO_INSTALL=1 never installs.
 level=${1:-run}
 venv=.venv
-stamp=$venv/.perigeo-$level
+stamp=.venv/.perigeo-$level
 
 case $level in
-  run) packages="-e ./postproc" ;;
-  test) packages="-e ./postproc[test]" ;;
-  lint) packages="-e ./postproc[test,lint]" ;;
-  *) echo "tools/python_env.sh: '$level': it must be run, test or lint" >&2; exit 1 ;;
+  run) package=./postproc ;;
+  test) package='./postproc[test]' ;;
+  lint) package='./postproc[test,lint]' ;;
+  site) package='./postproc[site]' ;;
+  *) echo "tools/python_env.sh: '$level': it must be run, test, lint or site" >&2; exit 1 ;;
 esac
 
 if [ ! -f postproc/pyproject.toml ]; then
@@ -22,9 +23,9 @@ if [ ! -f postproc/pyproject.toml ]; then
 fi
 
 # The environment does not survive a move of the folder or of its Python: both are in the stamp.
-wanted=$(echo "$level $(pwd -P) $(cksum < postproc/pyproject.toml)")
+wanted="$level $(pwd -P) $(cksum < postproc/pyproject.toml)"
 installed='import sys, importlib.util as u; sys.exit(not u.find_spec("perigeo_post"))'
-if [ -x $venv/bin/python ] && [ "$(cat $stamp 2>/dev/null)" = "$wanted" ] &&
+if [ -x $venv/bin/python ] && [ "$(cat "$stamp" 2>/dev/null)" = "$wanted" ] &&
     $venv/bin/python -c "$installed" 2>/dev/null; then
   exit 0
 fi
@@ -52,12 +53,12 @@ if ! $venv/bin/python -c 'import pip' 2>/dev/null ||
   fi
 fi
 
-echo "Python: installing into .venv: $packages"
+echo "Python: installing into .venv: -e $package"
 # An unsuccessful try must not count as done the next time.
-rm -f $stamp
-if ! $venv/bin/python -m pip install --quiet --disable-pip-version-check --retries 2 $packages
+rm -f "$stamp"
+if ! $venv/bin/python -m pip install --quiet --disable-pip-version-check --retries 2 -e "$package"
 then
   echo "Python: the packages could not be installed (see above; is there a network?)." >&2
   exit 1
 fi
-echo "$wanted" > $stamp
+echo "$wanted" > "$stamp"

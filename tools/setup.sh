@@ -1,8 +1,9 @@
 #!/bin/sh
-# Find what perigeo needs and install what is missing:  sh tools/setup.sh [run|test|lint]
+# Find what perigeo needs and install what is missing:  sh tools/setup.sh [run|test|lint|site]
 #
 #   run   compiler, make, HDF5, Python with perigeo-post in .venv (the default)
 #   test  also what the tests need          lint  also the linters
+#   site  what makes the pages of `make site`
 #
 # System packages are installed only where that takes no question: as root, or with a sudo that
 # asks for no password (Homebrew and an active conda environment need neither). Elsewhere this
@@ -10,8 +11,8 @@
 # of times: what is there stays as it is.
 level=${1:-run}
 case $level in
-  run | test | lint) ;;
-  *) echo "usage: sh tools/setup.sh [run|test|lint]" >&2; exit 1 ;;
+  run | test | lint | site) ;;
+  *) echo "usage: sh tools/setup.sh [run|test|lint|site]" >&2; exit 1 ;;
 esac
 cd "$(dirname "$0")/.." || exit 1
 compiler=${FC:-gfortran}
@@ -33,6 +34,7 @@ end program try
 FORTRAN
   link=$(sh tools/hdf5_flags.sh link "$compiler")
   # The lists of flags are split on purpose.
+  # shellcheck disable=SC2046,SC2086
   [ -n "$link" ] && $compiler $(sh tools/hdf5_flags.sh compile "$compiler") -J"$folder" \
     "$folder/try.f90" -o "$folder/try" $link >"$folder/log" 2>&1 && "$folder/try"
   works=$?
@@ -138,12 +140,12 @@ show_by_hand() {
         echo "  conda create -n perigeo -c conda-forge gfortran hdf5 make python"
         echo "  conda activate perigeo"
       else
-        install_commands $packages | sed 's/^/  /'
+        install_commands "$packages" | sed 's/^/  /'
       fi
       ;;
     *)
       if [ "$(id -u)" = 0 ]; then as_root=; else as_root="sudo "; fi
-      install_commands $packages | sed -e 's/^env [^ ]* //' -e 's/ -qq*//' -e "s/^/  $as_root/"
+      install_commands "$packages" | sed -e 's/^env [^ ]* //' -e 's/ -qq*//' -e "s/^/  $as_root/"
       ;;
   esac
 }
@@ -157,7 +159,7 @@ for attempt in first second; do
   find_system
   packages=
   for item in $missing; do packages="$packages $(package "$item")"; done
-  packages=$(echo $packages)
+  packages=${packages# }
 
   if [ "${NO_INSTALL:-0}" = 1 ]; then
     echo "NO_INSTALL=1 forbids installing."
@@ -172,10 +174,11 @@ for attempt in first second; do
 
   echo "Installing with ${system%-get}: $packages"
   log=$(mktemp "${TMPDIR:-/tmp}/perigeo-setup.XXXXXX") || exit 1
-  install_commands $packages > "$log.commands"
+  install_commands "$packages" > "$log.commands"
   while read -r command; do
     echo "  $prefix$command"
     # An update may fail for one foreign source and yet serve: what counts is the result below.
+    # shellcheck disable=SC2086   # words of a command
     $prefix$command </dev/null >>"$log" 2>&1 || true
   done < "$log.commands"
   hash -r

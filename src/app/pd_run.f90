@@ -16,7 +16,9 @@ module pd_run
   use pd_record, only: load_checkpoint, observe_state, open_record, record_frame, record_line, &
     record_progress, record_row, record_t, results_in_the_way, same_points
   use pd_schedule, only: schedule_t
-  use pd_setup, only: set_up_body, set_up_model, set_up_schedule
+  use pd_setup, only: set_up_model
+  use pd_setup_body, only: set_up_body
+  use pd_setup_schedule, only: set_up_schedule
   use pd_state, only: state_t
   use pd_step, only: step_work_t
   use pd_summary, only: summarise, summary_t

@@ -110,9 +110,9 @@ contains
     real(wp), intent(in), contiguous :: volume(:)   !! V (n) [m^2]
     real(wp), intent(in), contiguous :: h(:, :)     !! H (n,4) xx xy yx yy
     type(law_points_t), intent(inout) :: points
-    real(wp), intent(inout) :: p(n_block, 4)        !! out: P xx xy yx yy [Pa]
+    real(wp), intent(inout) :: p(n_block, 4)        !! out: P xx xy yx yy [Pa]; first the strain,
+                                                    !! which spares room in the cache
     real(wp), intent(out)   :: dissipated
-    real(wp)     :: strain(n_block, 4)
     type(flow_t) :: flow
     integer      :: first, i, k
 
@@ -120,8 +120,8 @@ contains
     first = self%runs(self%first_run(block))%lo
     do k = self%first_run(block), self%first_run(block + 1) - 1
       associate (run => self%runs(k), material => self%list(self%runs(k)%material))
-        call material%measure%strain_block(first, run%lo, run%hi, h, strain)
-        call material%law%stress_block(first, run%lo, run%hi, strain, points, flow)
+        call material%measure%strain_block(first, run%lo, run%hi, h, p)
+        call material%law%stress_block(first, run%lo, run%hi, p, points, flow)
         do i = 1, flow%n
           dissipated = dissipated + volume(flow%rows(i)) * flow%dissipated(i)
         end do

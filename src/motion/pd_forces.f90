@@ -107,16 +107,17 @@ contains
   pure integer function first_inverted(lo, hi, h) result(row)
     integer,  intent(in) :: lo, hi
     real(wp), intent(in), contiguous :: h(:, :)   !! H (n,4)
-    integer :: i, n_bad
+    real(wp) :: n_bad   ! not an integer: comparisons of reals then stay in their registers
+    integer  :: i
 
-    n_bad = 0
-    !$omp simd reduction(+:n_bad)
+    n_bad = 0.0_wp
+    !$omp simd simdlen(8) reduction(+:n_bad)
     do i = lo, hi
-      if (.not. (1.0_wp + h(i, 1)) * (1.0_wp + h(i, 4)) - h(i, 2) * h(i, 3) > 0.0_wp) &
-        n_bad = n_bad + 1
+      n_bad = n_bad + merge(0.0_wp, 1.0_wp, &
+        (1.0_wp + h(i, 1)) * (1.0_wp + h(i, 4)) - h(i, 2) * h(i, 3) > 0.0_wp)
     end do
     row = 0
-    if (n_bad == 0) return
+    if (n_bad < 0.5_wp) return
     do i = hi, lo, -1
       if (.not. (1.0_wp + h(i, 1)) * (1.0_wp + h(i, 4)) - h(i, 2) * h(i, 3) > 0.0_wp) row = i
     end do

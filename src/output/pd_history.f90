@@ -161,19 +161,17 @@ contains
     character(:), allocatable :: text
     integer, parameter :: width = 24   !! of a number with its sign
     character((width + 1) * size(numbers)) :: line
-    character(width) :: cell
-    integer :: k, length
+    character(width) :: cells(size(numbers))
+    integer :: k, length, more
 
+    write (cells, '(es24.16e3)') numbers
     length = 0
     do k = 1, size(numbers)
-      if (whole(k)) then
-        write (cell, '(i0)') int(numbers(k), i8)
-      else
-        write (cell, '(es24.16e3)') numbers(k)
-      end if
-      cell = adjustl(cell)
-      line(length + 1:) = trim(cell)//','
-      length = length + len_trim(cell) + 1
+      if (whole(k)) write (cells(k), '(i0)') int(numbers(k), i8)
+      cells(k) = adjustl(cells(k))
+      more = len_trim(cells(k)) + 1
+      line(length + 1:length + more) = cells(k)(:more - 1)//','
+      length = length + more
     end do
     text = line(:length - 1)
   end function comma_separated

@@ -100,10 +100,16 @@ contains
   pure real(wp) function plastic_strain(block) result(part)
     type(block_view_t), intent(in) :: block
     real(wp) :: alpha(n_block)
+    integer  :: i
 
-    alpha = 0.0_wp
     call block%model%materials%plastic_strain_block(block%number, block%state%law_points_t, alpha)
-    part = maxval(block%model%points%in_body(block%lo:block%hi) * alpha(:block%hi - block%lo + 1))
+    part = 0.0_wp
+    associate (in_body => block%model%points%in_body, lo => block%lo)
+      !$omp simd simdlen(8) reduction(max:part)
+      do i = lo, block%hi
+        part = max(part, in_body(i) * alpha(i - lo + 1))
+      end do
+    end associate
   end function plastic_strain
 
   pure real(wp) function kinetic_energy(block) result(part)

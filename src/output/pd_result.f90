@@ -35,7 +35,7 @@ module pd_result
   end type places_t
 
   !> Rows that wait for being written together.
-  integer, parameter :: bunch = 50
+  integer, parameter :: bunch = 250
 
   !> A result file of a run that is going on; the file itself is closed between calls.
   type :: result_t

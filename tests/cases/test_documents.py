@@ -46,6 +46,11 @@ def test_files_that_are_named_exist():
     assert not [item for item in missing if item[1] not in OF_THE_READER]
 
 
+def test_modules_that_are_named_exist():
+    modules = {path.stem for path in (ROOT / "src").glob("*/*.f90")} | {"pd_version"}
+    assert not [item for item in named(r"\b(pd_\w+)") if item[1] not in modules]
+
+
 def test_make_targets_that_are_named_exist():
     targets = set(re.findall(r"^([a-z0-9-]+):(?!=)", (ROOT / "Makefile").read_text(), re.M))
     for document, words in named(r"^ *make\b((?: +[\w./=-]+)*)"):

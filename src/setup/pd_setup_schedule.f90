@@ -1,0 +1,86 @@
+!> From checked input to the time step, the end of the run, and when something is written.
+module pd_setup_schedule
+  use pd_boundary, only: time_of_strain
+  use pd_clock, only: clock_t
+  use pd_errors, only: error_list_t
+  use pd_input_types, only: input_t
+  use pd_kinds, only: is_set, wp
+  use pd_model, only: model_t
+  use pd_schedule, only: new_schedule, schedule_t
+  use pd_stability, only: find_highest_frequency
+  implicit none
+  private
+
+  public :: set_up_schedule
+
+contains
+
+  !> Time step by the rule asked for, and the steps of the run, its frames and rows.
+  !>
+  !> `clock`: in: that of a checkpoint; with a time step of 0 the rule decides.
+  !> Errors: a run with too many steps, a strain that is never reached.
+  subroutine set_up_schedule(input, clock, model, schedule, errors)
+    type(input_t),      intent(in)    :: input
+    type(clock_t),      intent(inout) :: clock
+    type(model_t),      intent(inout) :: model
+    type(schedule_t),   intent(out)   :: schedule
+    type(error_list_t), intent(inout) :: errors
+    real(wp), allocatable :: frame_times(:)
+    real(wp) :: end_time
+    integer  :: k
+
+    associate (given => input%integration, dt => clock%time_step)
+      if (dt <= 0.0_wp) then
+        select case (given%time_step_rule)
+        case ('fixed')
+          dt = given%time_step
+        case ('courant')
+          dt = given%safety * model%spacing / model%materials%wave_speed()
+        case ('spectral')
+          call find_highest_frequency(model)
+          dt = given%safety * 2.0_wp / model%highest_frequency
+        end select
+      end if
+      end_time = given%end_time
+      if (is_set(given%final_strain)) end_time = strain_time(given%final_strain)
+    end associate
+
+    associate (given => input%output)
+      if (size(given%frame_strains) > 0) then
+        allocate (frame_times(size(given%frame_strains)))
+        do k = 1, size(frame_times)
+          frame_times(k) = strain_time(given%frame_strains(k))
+        end do
+      else if (size(given%frame_times) > 0) then
+        allocate (frame_times(size(given%frame_times)), source=given%frame_times)
+      else
+        allocate (frame_times(given%frame_count))
+        frame_times = [(end_time * real(k, wp) / real(size(frame_times), wp), &
+          k=1, size(frame_times))]
+      end if
+    end associate
+    if (errors%count() > 0) return
+    if (any(frame_times > end_time * (1.0_wp + 1.0e-9_wp))) then
+      call errors%add('a frame is asked for after the end of the run', '&output')
+      return
+    end if
+    call new_schedule(clock%time_step, end_time, input%output%history_count, frame_times, &
+      schedule, errors)
+
+  contains
+
+    !> Time at which the nominal strain reaches a value.
+    real(wp) function strain_time(strain) result(time)
+      real(wp), intent(in) :: strain
+      character(24) :: text
+
+      time = time_of_strain(model%platens, model%boundaries, strain)
+      if (time > 0.0_wp) return
+      write (text, '(g0.6)') strain
+      call errors%add('the motion of the platens never reaches a nominal strain', &
+        '&integration final_strain or &output frame_strains', trim(text))
+    end function strain_time
+
+  end subroutine set_up_schedule
+
+end module pd_setup_schedule
