@@ -50,8 +50,9 @@ def paragraphs(text: str) -> list[str]:
 
 def environment() -> Environment:
     """The templates with their filters; `style` is the style sheet, which the page holds itself."""
+    loader = PackageLoader("perigeo_post.report")
     found = Environment(
-        loader=PackageLoader("perigeo_post.report"),
+        loader=loader,
         autoescape=True,
         finalize=shown,
         undefined=StrictUndefined,
@@ -62,8 +63,7 @@ def environment() -> Environment:
         power, csv_cell, paragraphs, machine_text, cell, duration, number, plural, readable
     )  # fmt: skip
     found.filters.update({one.__name__: one for one in filters})
-    assert found.loader is not None
-    style = found.loader.get_source(found, "style.css")[0]
+    style = loader.get_source(found, "style.css")[0]
     found.globals.update(dash=DASH, marks=MARKS, style=Markup(style))
     return found
 
