@@ -89,7 +89,7 @@ class Chromium:
     )  # fmt: skip
     drivers = ("chromedriver", "chromium.chromedriver")
 
-    def __init__(self, program: str, driver: str | None) -> None:
+    def __init__(self, program: str, driver: str | None, dark: bool) -> None:
         options = webdriver.ChromeOptions()
         options.binary_location = program
         for word in ("headless=new", "no-first-run", "disable-gpu", "disable-dev-shm-usage",
@@ -102,6 +102,8 @@ class Chromium:
         service = webdriver.ChromeService(executable_path=driver)
         self.browser = webdriver.Chrome(options=options, service=service)
         self.browser.set_page_load_timeout(WAIT)
+        scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
+        self.command("Emulation.setEmulatedMedia", features=[scheme])
 
     def command(self, name: str, **values: Any) -> Any:
         return self.browser.execute_cdp_cmd(name, values)
@@ -113,12 +115,10 @@ class Chromium:
         return {event["params"]["request"]["url"] for event in events
                 if event["method"] == "Network.requestWillBeSent"}  # fmt: skip
 
-    def open(self, address: str, width: int, height: int, dark: bool) -> dict[str, Any]:
+    def open(self, address: str, width: int, height: int) -> dict[str, Any]:
         """Load the page at this size, anew; what it is like."""
         self.command("Emulation.setDeviceMetricsOverride", width=width, height=height,
                      deviceScaleFactor=2, mobile=width < 600)  # fmt: skip
-        scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
-        self.command("Emulation.setEmulatedMedia", features=[scheme])
         self.requests()
         self.browser.get(address)
         seen: dict[str, Any] = json.loads(self.browser.execute_script(f"return {LOOK}"))
@@ -143,12 +143,12 @@ class Firefox:
     programs = ("firefox", "firefox-esr", "/Applications/Firefox.app/Contents/MacOS/firefox")
     drivers = ("geckodriver",)
 
-    def __init__(self, program: str, driver: str | None) -> None:
+    def __init__(self, program: str, driver: str | None, dark: bool) -> None:
         options = webdriver.FirefoxOptions()
         options.binary_location = program
-        # The second word allows `context("chrome")`, where the scheme is set.
-        for word in ("-headless", "-remote-allow-system-access"):
-            options.add_argument(word)
+        options.add_argument("-headless")
+        scheme = "layout.css.prefers-color-scheme.content-override"
+        options.set_preference(scheme, 0 if dark else 1)
         options.set_preference("security.fileuri.strict_origin_policy", False)
         options.set_preference("ui.useOverlayScrollbars", 1)
         service = webdriver.FirefoxService(executable_path=driver)
@@ -156,11 +156,8 @@ class Firefox:
         self.browser.set_page_load_timeout(WAIT)
         self.browser.set_window_size(500, 1000)
 
-    def open(self, address: str, width: int, height: int, dark: bool) -> dict[str, Any]:
+    def open(self, address: str, width: int, height: int) -> dict[str, Any]:
         """Load the page at this size, anew; what it is like."""
-        name = "layout.css.prefers-color-scheme.content-override"
-        with self.browser.context("chrome"):
-            self.browser.execute_script(f"Services.prefs.setIntPref('{name}', {0 if dark else 1});")
         with tempfile.TemporaryDirectory(prefix="perigeo-view.") as folder:
             holder = Path(folder) / "holder.html"
             holder.write_text(
@@ -218,13 +215,15 @@ def faults(seen: dict[str, Any]) -> list[str]:
     return found
 
 
-def view(browser: Chromium | Firefox, page: Path, folder: Path) -> int:
-    """All views of the page; returns how many faults there are."""
+def view(browser: Chromium | Firefox, page: Path, folder: Path, dark: bool) -> tuple[int, set[str]]:
+    """The views of one scheme; returns how many faults there are, and the colours of the page."""
     count = 0
     papers = set()
-    for name, width, height, dark, photographed in VIEWS:
-        seen = browser.open(page.resolve().as_uri(), width, height, dark)
-        papers.add((dark, seen["paper"]))
+    for name, width, height, scheme, photographed in VIEWS:
+        if scheme != dark:
+            continue
+        seen = browser.open(page.resolve().as_uri(), width, height)
+        papers.add(seen["paper"])
         found = faults(seen)
         count += len(found)
         print(f"  {'FAILED' if found else 'ok    '}  {name}, {width} pixels: "
@@ -240,7 +239,23 @@ def view(browser: Chromium | Firefox, page: Path, folder: Path) -> int:
                 path = folder / (f"{stem}.png" if k == 1 else f"{stem}_{k}.png")
                 path.write_bytes(data)
                 print(f"          wrote {path}")
-    if {paper for dark, paper in papers if dark} & {paper for dark, paper in papers if not dark}:
+    return count, papers
+
+
+def view_all(kind: Kind, program: str, driver: str | None, page: Path, folder: Path) -> int:
+    """All views of the page; returns how many faults there are."""
+    count = 0
+    papers = []
+    for dark in (False, True):
+        # Firefox reads the scheme when it starts.
+        browser = kind(program, driver, dark)
+        try:
+            more, found = view(browser, page, folder, dark)
+        finally:
+            browser.browser.quit()
+        count += more
+        papers.append(found)
+    if papers[0] & papers[1]:
         print("  FAILED  the dark scheme is as light as the other")
         count += 1
     return count
@@ -268,10 +283,8 @@ def main() -> int:
     os.environ.setdefault("SE_AVOID_STATS", "true")
     if os.environ.get("NO_INSTALL") == "1":
         os.environ["SE_OFFLINE"] = "true"
-    browser = None
     try:
-        browser = kind(program, driver)
-        count = view(browser, page, folder)
+        count = view_all(kind, program, driver, page, folder)
     except NoSuchDriverException:
         print(f"No driver for {program}: there is no {kind.drivers[0]}.\n{INSTALL}",
               file=sys.stderr)  # fmt: skip
@@ -280,9 +293,6 @@ def main() -> int:
         words = str(getattr(error, "msg", None) or error) or type(error).__name__
         print(f"{program}: {words.splitlines()[0]}", file=sys.stderr)
         return 3
-    finally:
-        if browser is not None:
-            browser.browser.quit()
     print(f"report-view: {'all views are fine' if count == 0 else f'{count} faults'}")
     return 1 if count else 0
 
