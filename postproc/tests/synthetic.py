@@ -174,6 +174,56 @@ def add_yield_stress(path: Path) -> np.ndarray:
     return values
 
 
+def add_field(path: Path, name: str, unit: str, text: str, parts: str) -> np.ndarray:
+    """Give every frame a field of its own, as a law does; all its numbers differ."""
+    with h5py.File(path, "a") as file:
+        n = len(file["points/volume"])
+        count = len(parts.split())
+        values = np.arange(n * max(count, 1), dtype=float)
+        values = values.reshape(n, count) if count else values
+        for frame in file["frames"]:
+            _dataset(file, f"frames/{frame}/{name}", values, unit, text, parts)
+    return values
+
+
+def to_second_schema(
+    path: Path,
+    written: int | None = None,
+    places: int | None = None,
+    extra: dict[str, tuple[str, str, np.ndarray | None]] | None = None,
+) -> int:
+    """Put the history of the CSV beside a result into its /history; returns the rows written.
+
+    `written`: rows that the file has, all by default; `places`: rows with a place in the file.
+    `extra`: further columns (unit, description, values) of file and CSV.
+    """
+    csv = path.with_name(f"{path.stem}_history.csv")
+    lines = [line.split(",") for line in csv.read_text().splitlines()]
+    columns = {name: np.array([float(r[k]) for r in lines[1:]]) for k, name in enumerate(lines[0])}
+    rows = len(lines) - 1
+    meanings = {name: ("parsec", f"sentence of {name}") for name in columns}
+    meanings.update(step=("1", "step"), time=("s", "time"), strain=("1", "nominal strain"))
+    meanings.update({n: ("N/m", f"force {n}") for n in columns if "_force_" in n})
+    for name, (unit, text, values) in (extra or {}).items():
+        meanings[name] = (unit, text)
+        columns[name] = np.arange(rows) / 7.0 if values is None else values
+    table = zip(*columns.values())
+    text_lines = [",".join(columns), *(",".join(f"{v:.17g}" for v in row) for row in table)]
+    csv.write_text("\n".join(text_lines) + "\n")
+    written = rows if written is None else written
+    with h5py.File(path, "a") as file:
+        file.attrs["schema_version"] = np.int32(2)
+        group = file.create_group("history")
+        group.attrs["written"] = np.int32(written)
+        group.attrs["rows"] = np.int32(places or rows)
+        group.attrs["columns"] = np.bytes_(" ".join(columns))
+        for name, values in columns.items():
+            data = np.zeros(places or rows, dtype=np.int32 if name == "step" else float)
+            data[:written] = values[:written]
+            _dataset(file, f"history/{name}", data, *meanings[name], "")
+    return written
+
+
 def write_columns(path: Path, columns: dict[str, np.ndarray]) -> Path:
     """A history with these columns."""
     rows = np.column_stack(list(columns.values()))

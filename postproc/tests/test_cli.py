@@ -12,6 +12,7 @@ import synthetic
 from PIL import Image
 from test_figures import assert_drawn
 
+from perigeo_post import Run, contour_figure
 from perigeo_post.cli.command_line import COMMANDS, main
 
 Capture = pytest.CaptureFixture[str]
@@ -57,6 +58,37 @@ def test_info_tells_state_frames_and_numbers(result: Path, cut_off: Path, capsys
     assert capsys.readouterr().out == synthetic.NAMELIST
     assert main(["info", str(result), "--values"]) == 0
     assert "material.poissons_ratio = 0.3" in capsys.readouterr().out
+
+
+def test_info_shows_units_and_what_a_law_adds(result: Path, capsys: Capture) -> None:
+    assert main(["info", str(result)]) == 0
+    text = capsys.readouterr().out
+    assert "schema_version 1" in text
+    assert "400 rows in made_history.csv: step [1], time [s]" in text
+    n = synthetic.to_second_schema(result, extra={"crack_length": ("m", "of all cracks", None)})
+    synthetic.add_field(result, "damage_rate", "1/s", "rate of the damage", "")
+    synthetic.add_field(result, "back_stress", "Pa", "centre of the yield surface", "xx xy yx yy")
+    assert main(["info", str(result)]) == 0
+    text = capsys.readouterr().out
+    assert "schema_version 2" in text
+    assert f"{n} rows in made.h5: step [1], time [s]" in text
+    assert "crack_length [m]" in text
+    assert "damage_rate [1/s]" in text
+    assert "back_stress [Pa] (xx xy yx yy)" in text
+
+
+def test_a_field_that_a_law_adds_is_drawn_and_written_with_its_unit(
+    result: Path, tmp_path: Path, capsys: Capture
+) -> None:
+    synthetic.add_field(result, "damage_rate", "1/s", "rate of the damage", "")
+    figure, table = tmp_path / "a.png", tmp_path / "a.csv"
+    argv = ["contours", result, "--field", "damage_rate", "--strain", "1%"]
+    found = numbers(capsys, *argv, "--json", "--csv", table, "-o", figure)
+    assert found[0]["unit"] == "1/s"
+    assert table.read_text().splitlines()[0].endswith(",damage_rate [1/s]")
+    assert_drawn(figure)
+    drawn = contour_figure([Run(result).last_frame], "damage_rate")
+    assert drawn.axes[-1].get_ylabel() == "Damage rate [1/s]"
 
 
 def test_info_works_without_history_and_on_failed_runs(
@@ -209,9 +241,9 @@ def test_files_that_cannot_be_read_end_with_status_2(
 ) -> None:
     assert "no file" in refused(capsys, 2, "info", tmp_path / "none.h5")
     points, boundary = synthetic.lattice()
-    new = synthetic.write_result(tmp_path / "new.h5", points, boundary, [], version=2)
+    new = synthetic.write_result(tmp_path / "new.h5", points, boundary, [], version=3)
     for command in [name for name in COMMANDS if name not in ("study", "report")]:
-        assert "schema version 2" in refused(capsys, 2, command, new)
+        assert "schema version 3" in refused(capsys, 2, command, new)
     result.with_name("made_history.csv").unlink()
     assert "history" in refused(capsys, 2, "curves", result)
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import synthetic
 
 from perigeo_post import (
     Curve,
@@ -85,3 +86,25 @@ def test_curves_are_written_with_units(result: Path, tmp_path: Path) -> None:
     assert rows[0] == ["run", "strain [1]", "axial_stress [Pa]"]
     assert len(rows) == 401
     assert float(rows[-1][1]) == pytest.approx(0.016)
+
+
+def test_energies_are_known_by_their_units(result: Path) -> None:
+    first = [curve.y_name for curve in energy_curves(Run(result))]
+    assert first == [
+        "kinetic_energy", "strain_energy", "plastic_dissipation", "damping_dissipation",
+        "stabilisation_energy", "external_work",
+    ]  # fmt: skip
+    synthetic.to_second_schema(result, extra={"surface": ("J/m", "energy of cracks", None)})
+    curves = energy_curves(Run(result))
+    assert [(c.y_name, c.y_unit) for c in curves] == [("surface", "J/m")]
+
+
+def test_curves_of_the_second_schema_are_the_same(result: Path) -> None:
+    before = stress_strain(Run(result))
+    synthetic.to_second_schema(result, written=100)
+    after = stress_strain(Run(result))
+    assert np.array_equal(before.x, after.x)
+    assert np.array_equal(before.y, after.y)
+    assert (after.x_unit, after.y_unit) == ("1", "Pa")
+    curve = history_curve(Run(result), "top_force_y", "time")
+    assert (curve.x_unit, curve.y_unit) == ("s", "N/m")

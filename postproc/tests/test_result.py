@@ -16,7 +16,9 @@ from perigeo_post import (
     ResultError,
     Run,
     SchemaError,
+    read_history,
 )
+from perigeo_post.read.fields import label_of
 
 
 def test_a_complete_run_tells_what_it_is(result: Path) -> None:
@@ -174,21 +176,135 @@ def test_history_columns_have_units(result: Path) -> None:
         history["stress"]
 
 
+def test_columns_that_schema_1_did_not_have_get_no_unit(tmp_path: Path) -> None:
+    columns = {name: np.zeros(2) for name in ("step", "crack_energy", "stress_of_something")}
+    history = read_history(synthetic.write_columns(tmp_path / "h.csv", columns))
+    assert [history.unit(name) for name in columns] == ["1", "", ""]
+
+
+def test_units_of_the_second_schema_are_those_of_the_file(result: Path) -> None:
+    before = Run(result).history()
+    synthetic.to_second_schema(result, extra={"odd_stress": ("m^2", "an area", None)})
+    history = Run(result).history()
+    assert list(history) == [*before, "odd_stress"]
+    assert history.path == result
+    assert history.unit("odd_stress") == "m^2"
+    assert history.description("odd_stress") == "an area"
+    assert history.unit("kinetic_energy") == "parsec"
+    for name in before:
+        assert np.array_equal(history[name], before[name])
+        assert history[name].dtype == float
+    result.with_name("made_history.csv").unlink()
+    assert Run(result).has_history
+    assert np.array_equal(Run(result).history()["odd_stress"], np.arange(400) / 7.0)
+
+
+def test_rows_that_only_the_csv_has_are_added(result: Path) -> None:
+    synthetic.to_second_schema(result, written=250, places=500, extra={"a": ("kg", "mass", None)})
+    csv = result.with_name("made_history.csv")
+    csv.write_text(csv.read_text()[:-9])  # killed while it wrote a row
+    history = Run(result).history()
+    assert (history.rows, history.path) == (399, csv)
+    assert np.array_equal(history["a"], np.arange(399) / 7.0)
+    assert (history.unit("a"), history.description("a")) == ("kg", "mass")
+    csv.unlink()
+    history = Run(result).history()
+    assert (history.rows, history.path) == (250, result)
+    assert history["step"][-1] == 249
+
+
+def test_a_run_that_has_only_begun_takes_all_its_rows_from_the_csv(result: Path) -> None:
+    synthetic.to_second_schema(result, written=0, places=401)
+    assert Run(result).history().rows == 400
+    result.with_name("made_history.csv").unlink()
+    assert Run(result).history().rows == 0
+
+
+@pytest.mark.parametrize("spoilt", ["another number", "another column", "too long", "damaged"])
+def test_the_csv_of_another_run_is_not_mixed_in(result: Path, spoilt: str) -> None:
+    synthetic.to_second_schema(result, written=250, places=450)
+    csv = result.with_name("made_history.csv")
+    lines = csv.read_text().splitlines()
+    if spoilt == "another number":
+        cells = lines[250].split(",")
+        lines[250] = ",".join([*cells[:-1], repr(np.nextafter(float(cells[-1]), 1.0).item())])
+    elif spoilt == "another column":
+        lines[0] = lines[0].replace("external_work", "internal_work")
+    elif spoilt == "too long":
+        lines += [lines[-1]] * 51
+    else:
+        lines[300] = "1,2"
+    csv.write_text("\n".join(lines) + "\n")
+    history = Run(result).history()
+    assert (history.rows, history.path) == (250, result)
+    assert "external_work" in history
+
+
+def test_a_complete_history_of_the_file_needs_no_csv(result: Path) -> None:
+    synthetic.to_second_schema(result)
+    result.with_name("made_history.csv").write_text("nonsense")
+    assert Run(result).history().rows == 400
+
+
+def test_a_history_that_lacks_a_column_is_refused(result: Path) -> None:
+    synthetic.to_second_schema(result)
+    with h5py.File(result, "a") as file:
+        del file["history/time"]
+    with pytest.raises(ResultError, match="not complete"):
+        Run(result).history()
+
+
+def test_components_stand_in_the_order_of_the_file(result: Path) -> None:
+    values = synthetic.add_field(result, "first_piola", "Pa", "P", "xx xy yx yy")
+    synthetic.add_field(result, "triple", "K", "three numbers", "")
+    with h5py.File(result, "a") as file:
+        for group in file["frames"].values():
+            old = group["stress"][()]
+            group["stress"][...] = old[:, [3, 1, 0, 2]]
+            group["stress"].attrs["components"] = np.bytes_("xy yy xx zz")
+            del group["triple"]
+            group["triple"] = np.ones((len(old), 3))
+    run = Run(result)
+    frame = run.last_frame
+    assert np.array_equal(frame["first_piola_xy"], values[:, 1])
+    assert np.array_equal(frame["first_piola_yx"], values[:, 2])
+    assert np.array_equal(frame["first_piola_yy"], values[:, 3])
+    assert frame.scalar("first_piola_yx").unit == "Pa"
+    assert frame["stress_yy"] == pytest.approx(-170e3)
+    assert frame["pressure"] == pytest.approx((1e3 + 170e3 + 50e3) / 3)
+    assert {"first_piola_yx", "stress_zz", "triple_3"} <= set(run.field_names)
+    assert "first_piola_zz" not in run.field_names
+    for name in run.field_names:
+        assert len(frame[name]) == len(run.positions)
+
+
+def test_only_components_are_labelled_as_such() -> None:
+    assert label_of("strain_xy") == "Strain $E_{xy}$"
+    assert label_of("strain_rate") == "Strain rate"
+
+
+def test_what_a_tensor_cannot_give_is_not_offered(result: Path) -> None:
+    with h5py.File(result, "a") as file:
+        for group in file["frames"].values():
+            group["strain"].attrs["components"] = np.bytes_("xx yy xy yx")
+    run = Run(result)
+    assert "max_shear_strain" in run.field_names
+    assert "volumetric_strain" not in run.field_names
+    with pytest.raises(FieldNotFoundError, match="no field 'volumetric_strain'"):
+        run.last_frame.field("volumetric_strain")
+
+
 @pytest.mark.parametrize(
     ("tail", "rows"),
     [("", 3), ("4,5", 3), ("4,5,6", 3), ("4,5\n", 3), ("4,5,6\n", 4), ("\n", 3), ("x,y,z\n", 3)],
 )
 def test_an_unfinished_last_line_is_left_out(tmp_path: Path, tail: str, rows: int) -> None:
-    from perigeo_post import read_history
-
     path = tmp_path / "h.csv"
     path.write_text("step,time,strain\n1,2,3\n2,3,4\n3,4,5\n" + tail)
     assert read_history(path).rows == rows
 
 
 def test_a_history_damaged_in_the_middle_is_refused(tmp_path: Path) -> None:
-    from perigeo_post import read_history
-
     path = tmp_path / "h.csv"
     path.write_text("step,time\n1,2\n2\n3,4\n")
     with pytest.raises(ResultError, match="line 3"):
@@ -207,7 +323,7 @@ def test_a_renamed_result_still_finds_its_history(result: Path) -> None:
 def test_an_unknown_version_or_schema_is_refused(tmp_path: Path) -> None:
     points, boundary = synthetic.lattice()
     path = synthetic.write_result(tmp_path / "new.h5", points, boundary, [], version=7)
-    with pytest.raises(SchemaError, match="schema version 7, this perigeo-post reads 1"):
+    with pytest.raises(SchemaError, match="schema version 7, this perigeo-post reads 1, 2:"):
         Run(path)
     path = synthetic.write_result(tmp_path / "x.h5", points, boundary, [], schema="something")
     with pytest.raises(SchemaError, match="not a result of perigeo"):

@@ -4,6 +4,7 @@ module pd_check
   use omp_lib, only: omp_get_max_threads
   use pd_command_line, only: options_t, print_help
   use pd_errors, only: exit_ok, outcome_t
+  use pd_input_json, only: write_input_json
   use pd_input_reference, only: write_input_reference
   use pd_kinds, only: wp
   use pd_run, only: run_t
@@ -24,7 +25,11 @@ contains
 
     if (options%help) call print_help()
     if (options%version) write (output_unit, '(a)') 'perigeo '//code_version//' ('//git_hash//')'
-    if (options%input_reference) call write_input_reference(output_unit)
+    if (options%input_reference .and. options%json) then
+      call write_input_json(output_unit)
+    else if (options%input_reference) then
+      call write_input_reference(output_unit)
+    end if
     if (options%help .or. options%version .or. options%input_reference) &
       call outcome%end_with(exit_ok)
   end subroutine answer_questions

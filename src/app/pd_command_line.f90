@@ -2,6 +2,7 @@
 module pd_command_line
   use, intrinsic :: iso_fortran_env, only: output_unit
   use pd_errors, only: error_list_t
+  use pd_settings, only: setting_t
   use pd_text, only: nearest_name
   implicit none
   private
@@ -15,6 +16,8 @@ module pd_command_line
     integer :: threads = 0                    !! 0: as OMP_NUM_THREADS says
     logical :: check = .false., restart = .false., force = .false., quiet = .false.
     logical :: version = .false., help = .false., input_reference = .false.
+    logical :: json = .false., print_input = .false.
+    type(setting_t), allocatable :: settings(:)   !! group.key=value
   end type options_t
 
 contains
@@ -27,10 +30,12 @@ contains
     type(options_t),    intent(out)   :: options
     type(error_list_t), intent(inout) :: errors
     character(:), allocatable :: word
+    type(setting_t) :: setting
     integer :: i
 
     options%input_path = ''
     options%output_dir = ''
+    allocate (options%settings(0))
     i = 0
     do while (i < command_argument_count())
       i = i + 1
@@ -50,6 +55,13 @@ contains
         options%help = .true.
       case ('--input-reference')
         options%input_reference = .true.
+      case ('--json')
+        options%json = .true.
+      case ('--print-input')
+        options%print_input = .true.
+      case ('--set')
+        call value_of('--set', 'group.key=value', setting%text)
+        options%settings = [options%settings, setting]
       case ('--output')
         call value_of('--output', 'a folder', options%output_dir)
       case ('--threads')
@@ -61,6 +73,7 @@ contains
     if (options%version .or. options%help .or. options%input_reference) return
     if (options%input_path == '' .and. errors%count() == 0) &
       call errors%add('no input file is given; perigeo --help shows how')
+    if (options%json) call errors%add('--json goes with --input-reference alone')
     if (options%restart .and. options%force) call errors%add('--restart goes on with the '// &
       'results of an earlier run, --force overwrites them: use one of them')
 
@@ -102,8 +115,9 @@ contains
     character(*),       intent(in)    :: word
     type(options_t),    intent(inout) :: options
     type(error_list_t), intent(inout) :: errors
-    character(17), parameter :: known(9) = [character(17) :: '--check', '--output', '--threads', &
-      '--restart', '--force', '--quiet', '--version', '--help', '--input-reference']
+    character(17), parameter :: known(12) = [character(17) :: '--check', '--output', '--threads', &
+      '--restart', '--force', '--quiet', '--version', '--help', '--input-reference', '--json', &
+      '--set', '--print-input']
     character(:), allocatable :: near
 
     if (index(word, '-') == 1) then
@@ -139,13 +153,18 @@ contains
       '  RUN.nml             the input file, Fortran namelists: see doc/input.md and input/', &
       '', &
       '  --check             check the input and print the derived figures; run nothing', &
+      '  --set GROUP.KEY=VALUE', &
+      '                      a value in place of the one in the file; several times. A group that', &
+      '                      stands several times by its name or number: boundary.top.velocity=0,-1', &
+      '  --print-input       print all values as used, as an input file; run nothing', &
       '  --output DIR        folder for the results (default: output_dir of the input file,', &
       '                      or results/<name>)', &
       '  --threads N         number of threads (default: OMP_NUM_THREADS, or all cores)', &
       '  --restart           go on from the newest checkpoint in the output folder', &
       '  --force             overwrite the results of an earlier run', &
       '  --quiet             no progress on the screen; errors still appear', &
-      '  --input-reference   print the reference of all input keys (doc/input.md)', &
+      '  --input-reference   print the reference of all input keys (doc/input.md); with --json for', &
+      '                      programs', &
       '  --version, --help', &
       '', &
       'Results, in the output folder: <name>_history.csv (curves), <name>.h5 (fields),', &

@@ -1,18 +1,19 @@
 !> A run: everything that it consists of, and how it begins.
 module pd_run
-  use, intrinsic :: iso_fortran_env, only: int64
+  use, intrinsic :: iso_fortran_env, only: int64, output_unit
   use omp_lib, only: omp_get_max_threads
-  use pd_boundary, only: boundary_forces
   use pd_checkpoint, only: checkpoint_t
   use pd_clock, only: clock_t
   use pd_command_line, only: options_t
-  use pd_errors, only: error_list_t, exit_file, exit_input, exit_model, outcome_t
+  use pd_errors, only: error_list_t, exit_file, exit_input, exit_model, exit_ok, &
+    outcome_t
   use pd_history_columns, only: history_columns
   use pd_input, only: read_input
   use pd_input_types, only: input_t
   use pd_ledger, only: ledger_t, new_ledger
   use pd_model, only: model_t, start
   use pd_observe, only: column_t, moment_at, observation_t, observe
+  use pd_print_input, only: print_input
   use pd_record, only: load_checkpoint, observe_state, open_record, record_frame, record_line, &
     record_progress, record_row, record_t, results_in_the_way, same_points
   use pd_schedule, only: schedule_t
@@ -54,10 +55,15 @@ contains
     type(outcome_t), intent(inout) :: outcome
     type(error_list_t) :: errors, input_errors
 
-    call read_input(options%input_path, run%input, errors)
+    call read_input(options%input_path, options%settings, run%input, errors)
     call outcome%end_if_any(errors, exit_input)
     if (outcome%done) return
     if (options%output_dir /= '') run%input%run%output_dir = options%output_dir
+    if (options%print_input) then
+      call print_input(output_unit, run%input)
+      call outcome%end_with(exit_ok)
+      return
+    end if
     if (.not. options%check) call look_for_earlier_run(options, run, outcome)
     if (outcome%done) return
 
@@ -118,8 +124,7 @@ contains
         state%strength = model%strength
         call ledger%fit(model%blocks)
         call model%operators%take_in(state%displacement)
-        call boundary_forces(model%points%position, model%points%volume, run%clock%time(), &
-          state%force, model%boundaries)
+        call model%supports%take_reactions(model%points%volume, run%clock%time(), state%force)
       else
         call start(model, state)
         ledger = new_ledger(model%blocks)

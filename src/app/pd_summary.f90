@@ -9,6 +9,7 @@ module pd_summary
   use pd_model, only: model_t
   use pd_schedule, only: schedule_t
   use pd_state, only: state_t
+  use pd_text, only: number => short_number, whole => integer_text
   implicit none
   private
 
@@ -66,7 +67,7 @@ contains
       call summary%add('horizon', number(model%delta)//' m, spacing '// &
         number(model%spacing)//' m: m = '//number(model%delta / model%spacing))
       call summary%add('wave speed', 'c_p = '//number(model%materials%wave_speed())//' m/s')
-      call add_field(input%random_field, input%material, model, summary)
+      call add_field(input%random_field, input%materials(1), model, summary)
       courant = model%spacing / model%materials%wave_speed()
       text = number(clock%time_step)//' s = '//number(clock%time_step / courant)// &
         ' dx/c_p, rule '//input%integration%time_step_rule
@@ -76,11 +77,11 @@ contains
       if (model%highest_frequency > 0.0_wp) call summary%add('stable step', &
         '2/omega_max = '//number(2.0_wp / model%highest_frequency)//' s, of the elastic body')
       call summary%add('steps', whole(schedule%steps)//' to '//number(schedule%end_time)//' s')
-      if (model%platens%axis > 0) call summary%add('platens', &
-        model%boundaries(model%platens%first)%name//' and '// &
-        model%boundaries(model%platens%second)%name//', '//number(model%platens%length)// &
-        ' m apart')
-      call add_loads(input, model, summary)
+      associate (platens => model%platens, items => model%supports%items)
+        if (platens%axis > 0) call summary%add('platens', items(platens%first)%support%name// &
+          ' and '//items(platens%second)%support%name//', '//number(platens%length)//' m apart')
+      end associate
+      call add_loads(model, summary)
       call summary%add('frames', whole(size(schedule%frame_steps))// &
         ' and the unloaded state; history rows '//whole(schedule%rows))
       call summary%add('memory', number(memory(model) / 1.0e6_wp)//' MB')
@@ -114,44 +115,23 @@ contains
       'weaker than residual_strength')
   end subroutine add_field
 
-  !> Platens that move under a load, and pressures.
-  subroutine add_loads(input, model, summary)
-    type(input_t),   intent(in)    :: input
+  !> Supports under a load, and loads.
+  subroutine add_loads(model, summary)
     type(model_t),   intent(in)    :: model
     type(summary_t), intent(inout) :: summary
-    character(*), parameter :: per_length = ' N/m in all'
-    character(:), allocatable :: on
     integer :: k
 
-    do k = 1, size(input%boundaries)
-      associate (given => input%boundaries(k), boundary => model%boundaries(k))
-        if (.not. any(boundary%held)) cycle
-        call summary%add('traction', number(given%traction(1))//', '// &
-          number(given%traction(2))//' Pa on '//given%name//': '//number(boundary%applied(1))// &
-          ', '//number(boundary%applied(2))//per_length//whole_from(given%ramp_time))
+    do k = 1, size(model%supports%items)
+      associate (support => model%supports%items(k)%support)
+        if (allocated(support%load_kind)) &
+          call summary%add(support%load_kind, support%description())
       end associate
     end do
-    do k = 1, size(input%pressures)
-      associate (given => input%pressures(k), pressure => model%pressures(k))
-        on = ' m of the body'
-        if (any(model%points%in_body(pressure%points) < 0.5_wp)) on = on//' and layers that continue it'
-        call summary%add('pressure', given%name//': '//number(given%value)//' Pa on '// &
-          given%side//', '//number(pressure%length)//on//', '// &
-          whole(size(pressure%points))//' points: '//number(abs(sum(pressure%force)))// &
-          per_length//whole_from(given%ramp_time))
+    do k = 1, size(model%loads%items)
+      associate (load => model%loads%items(k)%load)
+        call summary%add(load%kind, load%description())
       end associate
     end do
-
-  contains
-
-    function whole_from(ramp_time) result(text)
-      real(wp), intent(in) :: ramp_time   !! [s]
-      character(:), allocatable :: text
-
-      text = ''
-      if (ramp_time > 0.0_wp) text = ', whole from '//number(ramp_time)//' s'
-    end function whole_from
-
   end subroutine add_loads
 
   !> Memory of a run [bytes]: bonds; per point the fields of the state, what is fixed (10 numbers),
@@ -187,37 +167,5 @@ contains
     end do
     seconds = whole_step * seconds * real(schedule%steps, wp)
   end function estimated_seconds
-
-  !> Up to five significant digits.
-  pure function number(x) result(text)
-    real(wp), intent(in) :: x
-    character(:), allocatable :: text
-    character(24) :: buffer
-    character(8)  :: form
-    integer :: decimals
-
-    if (abs(x) >= 1.0e7_wp .or. (abs(x) < 1.0e-3_wp .and. abs(x) > 0.0_wp)) then
-      write (buffer, '(es12.4)') x
-    else if (abs(x - anint(x)) <= 1.0e-9_wp * abs(x)) then
-      write (buffer, '(i0)') nint(x)
-    else
-      decimals = max(0, 4 - floor(log10(abs(x))))
-      write (form, '(a,i0,a)') '(f24.', decimals, ')'
-      write (buffer, form) x
-      if (decimals > 0) buffer = buffer(:verify(trim(buffer), '0', back=.true.))
-      if (buffer(len_trim(buffer):) == '.') buffer = buffer(:len_trim(buffer) - 1)
-    end if
-    text = trim(adjustl(buffer))
-  end function number
-
-  !> A whole number.
-  pure function whole(i) result(text)
-    integer, intent(in) :: i
-    character(:), allocatable :: text
-    character(12) :: buffer
-
-    write (buffer, '(i0)') i
-    text = trim(buffer)
-  end function whole
 
 end module pd_summary

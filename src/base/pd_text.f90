@@ -6,7 +6,7 @@ module pd_text
   private
 
   public :: lower_case, is_name, nearest_name, quoted_list, shortened
-  public :: number_text, integer_text, read_number, read_integer
+  public :: number_text, numbers_text, short_number, integer_text, read_number, read_integer
 
   character(*), parameter :: digits = '0123456789'
   character(*), parameter :: letters = 'abcdefghijklmnopqrstuvwxyz'
@@ -168,6 +168,28 @@ contains
     end if
   end function placed_point
 
+  !> A number with up to five significant digits.
+  pure function short_number(x) result(text)
+    real(wp), intent(in) :: x
+    character(:), allocatable :: text
+    character(24) :: buffer
+    character(8)  :: form
+    integer :: decimals
+
+    if (abs(x) >= 1.0e7_wp .or. (abs(x) < 1.0e-3_wp .and. abs(x) > 0.0_wp)) then
+      write (buffer, '(es12.4)') x
+    else if (abs(x - anint(x)) <= 1.0e-9_wp * abs(x)) then
+      write (buffer, '(i0)') nint(x)
+    else
+      decimals = max(0, 4 - floor(log10(abs(x))))
+      write (form, '(a,i0,a)') '(f24.', decimals, ')'
+      write (buffer, form) x
+      if (decimals > 0) buffer = buffer(:verify(trim(buffer), '0', back=.true.))
+      if (buffer(len_trim(buffer):) == '.') buffer = buffer(:len_trim(buffer) - 1)
+    end if
+    text = trim(adjustl(buffer))
+  end function short_number
+
   !> Read a real number: [+-]digits[.digits][e|d[+-]digits]. What is wrong with it in `problem`,
   !> empty where nothing is.
   !>
@@ -266,5 +288,23 @@ contains
       if (status /= 0) problem = 'not a whole number'
     end if
   end subroutine read_integer
+
+  !> Numbers separated by commas, each as `number_text` writes it.
+  pure function numbers_text(numbers) result(text)
+    real(wp), intent(in) :: numbers(:)
+    character(:), allocatable :: text
+    character(26 * max(1, size(numbers))) :: buffer
+    character(:), allocatable :: number
+    integer :: i, n
+
+    n = 0
+    do i = 1, size(numbers)
+      number = number_text(numbers(i))
+      if (i < size(numbers)) number = number//', '
+      buffer(n + 1:n + len(number)) = number
+      n = n + len(number)
+    end do
+    text = buffer(:n)
+  end function numbers_text
 
 end module pd_text

@@ -57,6 +57,7 @@ contains
         body%n = i
         allocate (body%position(i, 2), body%volume(i), source=0.0_wp)
         allocate (body%boundary(i), source=0)
+        allocate (body%part(i), source=1)
         status = iostat_end
       end if
     end do

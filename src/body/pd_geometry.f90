@@ -5,20 +5,12 @@
 module pd_geometry
   use pd_errors, only: error_list_t
   use pd_kinds, only: wp
+  use pd_point_sets, only: side_t
+  use pd_sides, only: bottom, covers, left, normal_axis, outward, right, side_count, side_names, top
   implicit none
   private
 
-  public :: body_t, lattice_t, layer_t, side_t, lattice_body, nearest_count, side_number
-
-  character(6), parameter :: side_names(4) = [character(6) :: 'bottom', 'top', 'left', 'right']
-
-  !> The points of a body on one of its four sides, layers that continue it included, and the part
-  !> of the side that each owns: half a spacing to either side with the layout nodes, less at an
-  !> end, the width of its cell with the layout cells.
-  type :: side_t
-    integer,  allocatable :: points(:)
-    real(wp), allocatable :: from(:), to(:)     !! coordinate along the side, ascending [m]
-  end type side_t
+  public :: body_t, lattice_t, layer_t, lattice_body, nearest_count
 
   !> Reference points in the order of the rows of the lattice (y slow, x fast), or of the file.
   type :: body_t
@@ -26,11 +18,13 @@ module pd_geometry
     real(wp), allocatable :: position(:, :)     !! X (n,2) [m]
     real(wp), allocatable :: volume(:)          !! V (n) per unit thickness [m^2]
     integer,  allocatable :: boundary(:)        !! 0: body, k: fictitious point of boundary k (n)
+    integer,  allocatable :: part(:)            !! number of the rectangle that a point lies in, or
+                                                !! that its layer continues (n)
     integer,  allocatable :: place(:, :)        !! column and row on the lattice (n,2); not allocated:
                                                 !! no lattice
     real(wp) :: lower(2) = 0.0_wp               !! corners of the extent of the body without
     real(wp) :: upper(2) = 0.0_wp               !! fictitious points, as used [m]
-    type(side_t) :: sides(4)                    !! by `side_number`; not for a cloud
+    type(side_t) :: sides(side_count)           !! by number (`pd_sides`); not for a cloud
   end type body_t
 
   !> How rectangles become points.
@@ -51,6 +45,7 @@ module pd_geometry
   !> of the body.
   type :: places_t
     integer, allocatable :: owner(:, :)         !! `empty`, or as body_t%boundary
+    integer, allocatable :: part(:, :)          !! number of the rectangle; 0: none
     logical, allocatable :: filled(:, :)        !! the square up and right of a node is material
     integer, allocatable :: number(:, :)        !! of the point at a place, 0: none
   end type places_t
@@ -103,6 +98,7 @@ contains
       end if
     end do
     call number_points(places, origin, lattice, body)
+    call find_parts(places, counts, lattice, body)
     call find_sides(places, origin, counts, lattice, body)
   end subroutine lattice_body
 
@@ -116,6 +112,8 @@ contains
 
     margin = lattice%rows + 1
     allocate (places%owner(-margin:counts(1) + margin, -margin:counts(2) + margin), source=empty)
+    allocate (places%part, mold=places%owner)
+    places%part = 0
     allocate (places%filled(-margin:counts(1) + margin, -margin:counts(2) + margin), &
       source=.false.)
     do k = 1, size(first, 2)
@@ -124,6 +122,7 @@ contains
       places%filled(a(1):b(1), a(2):b(2)) = .true.
       if (.not. lattice%cells) b = b + 1
       places%owner(a(1):b(1), a(2):b(2)) = 0
+      places%part(a(1):b(1), a(2):b(2)) = k
     end do
   end subroutine fill_rectangles
 
@@ -143,40 +142,40 @@ contains
     p = lattice%rows
     outer = merge(counts - 1, counts, lattice%cells)
     associate (owner => places%owner, filled => places%filled)
-      if (on('left')) then
+      if (on(left)) then
         do i = 1, p + 1
           if (i <= p) where (owner(0, 0:outer(2)) == 0) owner(-i, 0:outer(2)) = layer%boundary
           filled(-i, 0:counts(2) - 1) = filled(0, 0:counts(2) - 1)
         end do
       end if
-      if (on('right')) then
+      if (on(right)) then
         do i = 1, p + 1
           if (i <= p) where (owner(outer(1), 0:outer(2)) == 0) &
             owner(outer(1) + i, 0:outer(2)) = layer%boundary
           filled(counts(1) - 1 + i, 0:counts(2) - 1) = filled(counts(1) - 1, 0:counts(2) - 1)
         end do
       end if
-      if (on('bottom')) call fill_row(0, -1)
-      if (on('top')) call fill_row(outer(2), 1)
+      if (on(bottom)) call fill_row(0, -1)
+      if (on(top)) call fill_row(outer(2), 1)
     end associate
 
   contains
 
     !> Whether this layer lies on a side.
     logical function on(side)
-      character(*), intent(in) :: side
+      integer, intent(in) :: side
 
-      on = layer%side == side .or. layer%side == 'all'
+      on = covers(layer%side, side)
     end function on
 
     !> Whether any layer lies on a side.
     logical function any_on(side)
-      character(*), intent(in) :: side
+      integer, intent(in) :: side
       integer :: k
 
       any_on = .false.
       do k = 1, size(layers)
-        any_on = any_on .or. layers(k)%side == side .or. layers(k)%side == 'all'
+        any_on = any_on .or. covers(layers(k)%side, side)
       end do
     end function any_on
 
@@ -187,8 +186,8 @@ contains
 
       square_row = merge(0, counts(2) - 1, step < 0)
       columns = [0, outer(1)]
-      if (any_on('left') .and. places%owner(0, y) == 0) columns(1) = -p
-      if (any_on('right') .and. places%owner(outer(1), y) == 0) columns(2) = outer(1) + p
+      if (any_on(left) .and. places%owner(0, y) == 0) columns(1) = -p
+      if (any_on(right) .and. places%owner(outer(1), y) == 0) columns(2) = outer(1) + p
       from = columns(1)
       to = columns(2)
       do k = 1, p + 1
@@ -206,6 +205,22 @@ contains
     end subroutine fill_row
 
   end subroutine fill_layer
+
+  !> The rectangle of every point: the last one that holds it. A layer continues what is beside it.
+  pure subroutine find_parts(places, counts, lattice, body)
+    type(places_t),  intent(in)    :: places
+    integer,         intent(in)    :: counts(2)
+    type(lattice_t), intent(in)    :: lattice
+    type(body_t),    intent(inout) :: body
+    integer :: i, outer(2), beside(2)
+
+    outer = merge(counts - 1, counts, lattice%cells)
+    allocate (body%part(body%n))
+    do i = 1, body%n
+      beside = min(outer, max(0, body%place(i, :)))
+      body%part(i) = max(1, places%part(beside(1), beside(2)))
+    end do
+  end subroutine find_parts
 
   !> Number the occupied places row by row, and give them positions and volumes.
   subroutine number_points(places, origin, lattice, body)
@@ -240,15 +255,6 @@ contains
     end do
   end subroutine number_points
 
-  !> Index of a side in `body_t%sides`, 0 where there is none of that name.
-  pure integer function side_number(side) result(k)
-    character(*), intent(in) :: side
-
-    do k = size(side_names), 1, -1
-      if (side_names(k) == side) return
-    end do
-  end function side_number
-
   !> Points on the outermost line of the body at each side. Parts of the body that are set back from
   !> that line do not belong to the side.
   subroutine find_sides(places, origin, counts, lattice, body)
@@ -257,18 +263,28 @@ contains
     integer,         intent(in)    :: counts(2)
     type(lattice_t), intent(in)    :: lattice
     type(body_t),    intent(inout) :: body
-    integer :: line(4), squares(4), k
+    integer :: line(side_count), squares(side_count), k
 
-    squares = [0, counts(2) - 1, 0, counts(1) - 1]
+    squares([bottom, left]) = 0
+    squares(top) = counts(2) - 1
+    squares(right) = counts(1) - 1
     line = squares
-    if (.not. lattice%cells) line([2, 4]) = squares([2, 4]) + 1
-    do k = 1, 2
-      call find_side(lbound(places%number, 1), places%number(:, line(k)), &
-        places%filled(:, squares(k)), origin(1), lattice, body%sides(k))
-    end do
-    do k = 3, 4
-      call find_side(lbound(places%number, 2), places%number(line(k), :), &
-        places%filled(squares(k), :), origin(2), lattice, body%sides(k))
+    if (.not. lattice%cells) line([top, right]) = squares([top, right]) + 1
+    do k = 1, side_count
+      associate (side => body%sides(k), along => 3 - normal_axis(side_names(k)))
+        if (along == 1) then
+          call find_side(lbound(places%number, 1), places%number(:, line(k)), &
+            places%filled(:, squares(k)), origin(1), lattice, side)
+        else
+          call find_side(lbound(places%number, 2), places%number(line(k), :), &
+            places%filled(squares(k), :), origin(2), lattice, side)
+        end if
+        side%name = trim(side_names(k))
+        side%axis = 3 - along
+        side%outward = outward(side%name)
+        side%lower = body%lower(along)
+        side%upper = body%upper(along)
+      end associate
     end do
   end subroutine find_sides
 

@@ -2,14 +2,16 @@
 module pd_input
   use pd_errors, only: error_list_t
   use pd_input_checks, only: check_model, resolved_path
-  use pd_input_types, only: boundary_input_t, input_t, pressure_input_t
-  use pd_input_values, only: check_groups, count_groups, group_named, is_given, take_integer, &
-    take_list, take_real, take_text, take_vector
-  use pd_kinds, only: wp
+  use pd_input_types, only: input_t
+  use pd_input_values, only: check_groups, count_groups, group_named, take_integer, take_list, &
+    take_real, take_text, take_vector
+  use pd_keys, only: group_key_t, key_t, key_visitor_t
+  use pd_kinds, only: is_set, wp
   use pd_load_checks, only: check_loads
   use pd_motion_checks, only: check_motion
   use pd_namelist, only: namelist_group_t, read_text_file, scan_namelist
-  use pd_platens, only: platens_of
+  use pd_platen_checks, only: platens_of
+  use pd_settings, only: apply_settings, setting_t
   use pd_used_values, only: compare_used, used_values
   implicit none
   private
@@ -18,15 +20,30 @@ module pd_input
 
   integer, parameter :: frames_by_default = 10
 
+  !> Fetches the value of every key.
+  type, extends(key_visitor_t) :: reader_t
+    character(:), allocatable :: path
+    type(namelist_group_t), allocatable :: groups(:)
+    type(namelist_group_t) :: here          !! the group that the keys belong to
+  contains
+    procedure :: group => read_group
+    procedure :: text => read_text
+    procedure :: number => read_number
+    procedure :: whole => read_whole
+    procedure :: numbers => read_numbers
+    procedure :: list => read_list
+  end type reader_t
+
 contains
 
-  !> Read and check an input file.
+  !> Read and check an input file, with values of the command line in place of those in the file.
   !>
   !> Without errors `input` holds the values as used: defaults filled, every allocatable allocated,
   !> lists and tables of size 0 where absent, numbers without default `unset` where not given.
   !> Errors: every mistake of the file, or why it cannot be read; `input` is then of no use.
-  subroutine read_input(path, input, errors)
+  subroutine read_input(path, settings, input, errors)
     character(*),       intent(in)    :: path
+    type(setting_t),    intent(in)    :: settings(:)   !! group.key=value
     type(input_t),      intent(out)   :: input
     type(error_list_t), intent(inout) :: errors
     type(namelist_group_t), allocatable :: groups(:)
@@ -39,7 +56,9 @@ contains
     if (errors%count() > before) return
     call scan_namelist(input%path, input%text, groups, errors, complete)
     if (.not. complete) return
+    call apply_settings(input%path, settings, groups, errors)
     call check_groups(groups, errors, input%path)
+    input%groups = groups
     call fill(groups, input)
     call check_model(input, groups, errors)
     call check_motion(input, groups, errors)
@@ -50,168 +69,77 @@ contains
   subroutine fill(groups, input)
     type(namelist_group_t), intent(in)    :: groups(:)
     type(input_t),          intent(inout) :: input
+    type(reader_t) :: reader
     integer :: k
 
-    call fill_run(group_named(groups, 'run', 1, input%path), input)
-    call fill_discretisation(group_named(groups, 'discretisation', 1, input%path), input)
     allocate (input%bodies(count_groups(groups, 'body')))
-    do k = 1, size(input%bodies)
-      call fill_body(group_named(groups, 'body', k, input%path), input, k)
-    end do
-    call fill_material(group_named(groups, 'material', 1, input%path), input)
+    allocate (input%materials(max(1, count_groups(groups, 'material'))))
     allocate (input%boundaries(count_groups(groups, 'boundary')))
-    do k = 1, size(input%boundaries)
-      call fill_boundary(group_named(groups, 'boundary', k, input%path), input%boundaries(k))
-    end do
-    input%platens = platens_of(input%boundaries)
     allocate (input%pressures(count_groups(groups, 'pressure')))
-    do k = 1, size(input%pressures)
-      call fill_pressure(group_named(groups, 'pressure', k, input%path), input%pressures(k))
+    reader%path = input%path
+    reader%groups = groups
+    call input%visit(reader)
+    input%platens = platens_of(input%boundaries)
+    do k = 1, size(input%bodies)
+      if (input%bodies(k)%material == '') input%bodies(k)%material = input%materials(1)%name
     end do
-    call fill_stabilisation(group_named(groups, 'stabilisation', 1, input%path), input)
-    call fill_integration(group_named(groups, 'integration', 1, input%path), input)
-    call fill_imperfection(group_named(groups, 'imperfection', 1, input%path), input)
-    call fill_random_field(group_named(groups, 'random_field', 1, input%path), input)
-    call fill_output(group_named(groups, 'output', 1, input%path), input)
+    associate (r => input%run, o => input%output, p => input%imperfection)
+      if (r%title == '') r%title = r%name
+      if (r%output_dir == '') r%output_dir = 'results/'//r%name
+      if (size(o%frame_strains) == 0 .and. size(o%frame_times) == 0 .and. o%frame_count == 0) &
+        o%frame_count = frames_by_default
+      ! without a weak patch its centre and radius need not be given
+      if (.not. is_set(p%x)) p%x = 0.0_wp
+      if (.not. is_set(p%y)) p%y = 0.0_wp
+      if (.not. is_set(p%radius)) p%radius = 0.0_wp
+    end associate
   end subroutine fill
 
-  subroutine fill_run(group, input)
-    type(namelist_group_t), intent(in)    :: group
-    type(input_t),          intent(inout) :: input
+  subroutine read_group(self, about)
+    class(reader_t),   intent(inout) :: self
+    type(group_key_t), intent(in)    :: about
 
-    call take_text(group, 'name', input%run%name)
-    call take_text(group, 'title', input%run%title)
-    call take_text(group, 'output_dir', input%run%output_dir)
-    call take_text(group, 'operators', input%run%operators)
-    if (.not. is_given(group, 'title')) input%run%title = input%run%name
-    if (.not. is_given(group, 'output_dir')) input%run%output_dir = 'results/'//input%run%name
-  end subroutine fill_run
+    self%here = group_named(self%groups, trim(about%name), about%number, self%path)
+  end subroutine read_group
 
-  subroutine fill_discretisation(group, input)
-    type(namelist_group_t), intent(in)    :: group
-    type(input_t),          intent(inout) :: input
+  subroutine read_text(self, key, value)
+    class(reader_t),           intent(inout) :: self
+    type(key_t),               intent(in)    :: key
+    character(:), allocatable, intent(inout) :: value
 
-    call take_real(group, 'spacing', input%discretisation%spacing)
-    call take_real(group, 'horizon', input%discretisation%horizon)
-    call take_text(group, 'layout', input%discretisation%layout)
-    call take_text(group, 'volumes', input%discretisation%volumes)
-    call take_text(group, 'influence', input%discretisation%influence)
-    call take_text(group, 'fit', input%discretisation%fit)
-  end subroutine fill_discretisation
+    call take_text(self%here, key, value)
+  end subroutine read_text
 
-  subroutine fill_body(group, input, k)
-    type(namelist_group_t), intent(in)    :: group
-    type(input_t),          intent(inout) :: input
-    integer,                intent(in)    :: k
+  subroutine read_number(self, key, value)
+    class(reader_t), intent(inout) :: self
+    type(key_t),     intent(in)    :: key
+    real(wp),        intent(inout) :: value
 
-    call take_text(group, 'shape', input%bodies(k)%shape)
-    call take_text(group, 'file', input%bodies(k)%file)
-    call take_real(group, 'x_min', input%bodies(k)%x_min)
-    call take_real(group, 'x_max', input%bodies(k)%x_max)
-    call take_real(group, 'y_min', input%bodies(k)%y_min)
-    call take_real(group, 'y_max', input%bodies(k)%y_max)
-  end subroutine fill_body
+    call take_real(self%here, key, value)
+  end subroutine read_number
 
-  subroutine fill_material(group, input)
-    type(namelist_group_t), intent(in)    :: group
-    type(input_t),          intent(inout) :: input
+  subroutine read_whole(self, key, value)
+    class(reader_t), intent(inout) :: self
+    type(key_t),     intent(in)    :: key
+    integer,         intent(inout) :: value
 
-    call take_text(group, 'model', input%material%model)
-    call take_text(group, 'strain_measure', input%material%strain_measure)
-    call take_real(group, 'density', input%material%density)
-    call take_real(group, 'youngs_modulus', input%material%youngs_modulus)
-    call take_real(group, 'poissons_ratio', input%material%poissons_ratio)
-    call take_real(group, 'yield_stress', input%material%yield_stress)
-    call take_real(group, 'kinematic_modulus', input%material%kinematic_modulus)
-    call take_real(group, 'isotropic_modulus', input%material%isotropic_modulus)
-    call take_real(group, 'residual_strength', input%material%residual_strength)
-  end subroutine fill_material
+    call take_integer(self%here, key, value)
+  end subroutine read_whole
 
-  subroutine fill_boundary(group, boundary)
-    type(namelist_group_t), intent(in)    :: group
-    type(boundary_input_t), intent(inout) :: boundary
+  subroutine read_numbers(self, key, values)
+    class(reader_t), intent(inout) :: self
+    type(key_t),     intent(in)    :: key
+    real(wp),        intent(inout) :: values(:)
 
-    call take_text(group, 'name', boundary%name)
-    call take_text(group, 'side', boundary%side)
-    call take_text(group, 'contact', boundary%contact)
-    call take_vector(group, 'velocity', boundary%velocity)
-    call take_list(group, 'times', boundary%times)
-    call take_list(group, 'velocities_x', boundary%velocities_x)
-    call take_list(group, 'velocities_y', boundary%velocities_y)
-    call take_vector(group, 'velocity_gradient', boundary%velocity_gradient)
-    call take_list(group, 'factors', boundary%factors)
-    call take_list(group, 'traction', boundary%traction)
-    call take_real(group, 'ramp_time', boundary%ramp_time)
-  end subroutine fill_boundary
+    call take_vector(self%here, key, values)
+  end subroutine read_numbers
 
-  subroutine fill_pressure(group, pressure)
-    type(namelist_group_t), intent(in)    :: group
-    type(pressure_input_t), intent(inout) :: pressure
+  subroutine read_list(self, key, values)
+    class(reader_t),       intent(inout) :: self
+    type(key_t),           intent(in)    :: key
+    real(wp), allocatable, intent(inout) :: values(:)
 
-    call take_text(group, 'name', pressure%name)
-    call take_text(group, 'side', pressure%side)
-    call take_list(group, 'span', pressure%span)
-    call take_real(group, 'value', pressure%value)
-    call take_real(group, 'ramp_time', pressure%ramp_time)
-  end subroutine fill_pressure
-
-  subroutine fill_stabilisation(group, input)
-    type(namelist_group_t), intent(in)    :: group
-    type(input_t),          intent(inout) :: input
-
-    call take_text(group, 'method', input%stabilisation%method)
-    call take_real(group, 'factor', input%stabilisation%factor)
-  end subroutine fill_stabilisation
-
-  subroutine fill_integration(group, input)
-    type(namelist_group_t), intent(in)    :: group
-    type(input_t),          intent(inout) :: input
-
-    call take_real(group, 'end_time', input%integration%end_time)
-    call take_real(group, 'final_strain', input%integration%final_strain)
-    call take_text(group, 'time_step_rule', input%integration%time_step_rule)
-    call take_real(group, 'time_step', input%integration%time_step)
-    call take_real(group, 'safety', input%integration%safety)
-    call take_real(group, 'damping', input%integration%damping)
-    call take_text(group, 'damping_frame', input%integration%damping_frame)
-  end subroutine fill_integration
-
-  !> Without a weak patch its centre and radius need not be given; they are 0 then.
-  subroutine fill_imperfection(group, input)
-    type(namelist_group_t), intent(in)    :: group
-    type(input_t),          intent(inout) :: input
-
-    call take_real(group, 'amplitude', input%imperfection%amplitude)
-    call take_real(group, 'x', input%imperfection%x)
-    call take_real(group, 'y', input%imperfection%y)
-    call take_real(group, 'radius', input%imperfection%radius)
-    if (.not. is_given(group, 'x')) input%imperfection%x = 0.0_wp
-    if (.not. is_given(group, 'y')) input%imperfection%y = 0.0_wp
-    if (.not. is_given(group, 'radius')) input%imperfection%radius = 0.0_wp
-  end subroutine fill_imperfection
-
-  subroutine fill_random_field(group, input)
-    type(namelist_group_t), intent(in)    :: group
-    type(input_t),          intent(inout) :: input
-
-    associate (f => input%random_field)
-      call take_real(group, 'coefficient_of_variation', f%coefficient_of_variation)
-      call take_real(group, 'correlation_length', f%correlation_length)
-      call take_integer(group, 'seed', f%seed)
-    end associate
-  end subroutine fill_random_field
-
-  subroutine fill_output(group, input)
-    type(namelist_group_t), intent(in)    :: group
-    type(input_t),          intent(inout) :: input
-
-    call take_list(group, 'frame_strains', input%output%frame_strains)
-    call take_list(group, 'frame_times', input%output%frame_times)
-    call take_integer(group, 'frame_count', input%output%frame_count)
-    call take_integer(group, 'history_count', input%output%history_count)
-    call take_real(group, 'checkpoint_every', input%output%checkpoint_every)
-    if (.not. (is_given(group, 'frame_strains') .or. is_given(group, 'frame_times') &
-               .or. is_given(group, 'frame_count'))) input%output%frame_count = frames_by_default
-  end subroutine fill_output
+    call take_list(self%here, key, values)
+  end subroutine read_list
 
 end module pd_input

@@ -4,11 +4,11 @@
 !> because it has been complained about already.
 module pd_input_checks
   use pd_errors, only: error_list_t
-  use pd_input_types, only: body_input_t, input_t
+  use pd_input_types, only: body_input_t, input_t, material_input_t
   use pd_input_values, only: count_groups, group_named, is_damaged, is_given
   use pd_kinds, only: is_set, wp
   use pd_namelist, only: max_problems, namelist_group_t, place_of
-  use pd_text, only: integer_text, number_text
+  use pd_text, only: integer_text, number_text, quoted_list
   implicit none
   private
 
@@ -33,7 +33,7 @@ contains
       call check_body(input, k, group_named(groups, 'body', k, input%path), errors)
     end do
     call check_number_of_points(input, groups, errors)
-    call check_material(input, group_named(groups, 'material', 1, input%path), errors)
+    call check_materials(input, groups, errors)
     call check_stabilisation(input, group_named(groups, 'stabilisation', 1, input%path), errors)
     call check_imperfection(input, group_named(groups, 'imperfection', 1, input%path), errors)
     if (count_groups(groups, 'random_field') > 0) &
@@ -295,41 +295,67 @@ contains
       *min(1.0e20_wp, (body%y_max - body%y_min)/spacing + 1.0_wp)
   end function points_of
 
-  subroutine check_material(input, group, errors)
+  !> Every material for itself, their names, and the names that bodies ask for.
+  subroutine check_materials(input, groups, errors)
     type(input_t),          intent(in)    :: input
+    type(namelist_group_t), intent(in)    :: groups(:)
+    type(error_list_t),     intent(inout) :: errors
+    type(namelist_group_t) :: group
+    character(48) :: names(size(input%materials))
+    integer :: k
+
+    do k = 1, size(input%materials)
+      group = group_named(groups, 'material', k, input%path)
+      names(k) = input%materials(k)%name
+      if (size(names) > 1 .and. .not. is_given(group, 'name')) then
+        call add_missing(group, 'name', 'where there are several materials', errors)
+      else if (any(names(:k - 1) == names(k))) then
+        call errors%add('two materials have one name', where=place_of(group, 'name'), &
+          found=''''//trim(names(k))//'''', allowed='each name once')
+      end if
+      call check_material(input%materials(k), group, errors)
+    end do
+    do k = 1, size(input%bodies)
+      if (all(names /= input%bodies(k)%material)) call errors%add( &
+        'there is no such material', &
+        where=place_of(group_named(groups, 'body', k, input%path), 'material'), &
+        found=''''//input%bodies(k)%material//'''', allowed=quoted_list(names))
+    end do
+  end subroutine check_materials
+
+  subroutine check_material(m, group, errors)
+    type(material_input_t), intent(in)    :: m
     type(namelist_group_t), intent(in)    :: group
     type(error_list_t),     intent(inout) :: errors
     real(wp) :: h_i, h_k, three_g
 
     ! Plasticity keys are left alone with 'elastic', so that one word switches the model.
-    if (input%material%model /= 'j2') return
-    associate (m => input%material)
-      if (.not. is_given(group, 'yield_stress')) &
-        call add_missing(group, 'yield_stress', 'for model = ''j2''', errors)
-      if (is_set(m%residual_strength) .and. is_set(m%yield_stress)) then
-        if (m%residual_strength > m%yield_stress) call errors%add( &
-          'the residual strength is above the yield stress', &
-          where=place_of(group, 'residual_strength'), found=number_text(m%residual_strength), &
-          allowed='0 to yield_stress = '//number_text(m%yield_stress)//' [Pa]')
-      end if
-      h_k = m%kinematic_modulus
-      h_i = m%isotropic_modulus
-      if (.not. (is_set(h_k) .and. is_set(h_i))) return
-      if (min(h_k, h_i) < 0.0_wp .and. .not. is_given(group, 'residual_strength')) &
-        call add_missing(group, 'residual_strength', 'where a modulus is negative', errors)
-      if (.not. (is_set(m%youngs_modulus) .and. is_set(m%poissons_ratio))) return
-      three_g = 1.5_wp*m%youngs_modulus/(1.0_wp + m%poissons_ratio)
-      if (three_g + h_k + h_i <= 0.0_wp) then
-        call errors%add('the material softens more steeply than it can unload', &
-          where=place_of(group, steeper_key(h_k, h_i)), found='H_k + H_i = ' &
-          //number_text(h_k + h_i), allowed='above -3 G = '//number_text(-three_g)//' [Pa]')
-      else if (max(h_k, h_i) < 0.0_wp .and. three_g + h_i + min(h_k, h_i) <= 0.0_wp) then
-        call errors%add('the material softens more steeply than it can unload', &
-          where=place_of(group, steeper_key(h_k, h_i)), found='H_i + min(H_k, H_i) = ' &
-          //number_text(h_i + min(h_k, h_i)), &
-          allowed='above -3 G = '//number_text(-three_g)//' [Pa]')
-      end if
-    end associate
+    if (m%model /= 'j2') return
+    if (.not. is_given(group, 'yield_stress')) &
+      call add_missing(group, 'yield_stress', 'for model = ''j2''', errors)
+    if (is_set(m%residual_strength) .and. is_set(m%yield_stress)) then
+      if (m%residual_strength > m%yield_stress) call errors%add( &
+        'the residual strength is above the yield stress', &
+        where=place_of(group, 'residual_strength'), found=number_text(m%residual_strength), &
+        allowed='0 to yield_stress = '//number_text(m%yield_stress)//' [Pa]')
+    end if
+    h_k = m%kinematic_modulus
+    h_i = m%isotropic_modulus
+    if (.not. (is_set(h_k) .and. is_set(h_i))) return
+    if (min(h_k, h_i) < 0.0_wp .and. .not. is_given(group, 'residual_strength')) &
+      call add_missing(group, 'residual_strength', 'where a modulus is negative', errors)
+    if (.not. (is_set(m%youngs_modulus) .and. is_set(m%poissons_ratio))) return
+    three_g = 1.5_wp*m%youngs_modulus/(1.0_wp + m%poissons_ratio)
+    if (three_g + h_k + h_i <= 0.0_wp) then
+      call errors%add('the material softens more steeply than it can unload', &
+        where=place_of(group, steeper_key(h_k, h_i)), found='H_k + H_i = ' &
+        //number_text(h_k + h_i), allowed='above -3 G = '//number_text(-three_g)//' [Pa]')
+    else if (max(h_k, h_i) < 0.0_wp .and. three_g + h_i + min(h_k, h_i) <= 0.0_wp) then
+      call errors%add('the material softens more steeply than it can unload', &
+        where=place_of(group, steeper_key(h_k, h_i)), found='H_i + min(H_k, H_i) = ' &
+        //number_text(h_i + min(h_k, h_i)), &
+        allowed='above -3 G = '//number_text(-three_g)//' [Pa]')
+    end if
   end subroutine check_material
 
   pure function steeper_key(h_k, h_i) result(key)
@@ -362,8 +388,9 @@ contains
     type(namelist_group_t), intent(in)    :: group
     type(error_list_t),     intent(inout) :: errors
     real(wp) :: weakest
+    integer  :: k
 
-    associate (p => input%imperfection, m => input%material)
+    associate (p => input%imperfection)
       if (.not. is_set(p%amplitude)) return
       if (p%amplitude <= 0.0_wp) return
       if (.not. is_given(group, 'x')) call add_missing(group, 'x', 'for a weak patch', errors)
@@ -374,14 +401,18 @@ contains
         call errors%add('the weak patch has no extent', where=place_of(group, 'radius'), &
                         found=number_text(p%radius), allowed='> 0 where amplitude is above 0 [m]')
       end if
-      if (m%model /= 'j2') return
-      if (.not. (is_set(m%yield_stress) .and. is_set(m%residual_strength))) return
-      weakest = (1.0_wp - p%amplitude)*m%yield_stress
-      if (m%residual_strength <= m%yield_stress .and. weakest < m%residual_strength) &
-        call errors%add('the weak patch is weaker than residual_strength', &
-          where=place_of(group, 'amplitude'), found=number_text(p%amplitude), &
-          allowed='(1 - amplitude) yield_stress at least '//number_text(m%residual_strength) &
-          //' [Pa]')
+      do k = 1, size(input%materials)
+        associate (m => input%materials(k))
+          if (m%model /= 'j2') cycle
+          if (.not. (is_set(m%yield_stress) .and. is_set(m%residual_strength))) cycle
+          weakest = (1.0_wp - p%amplitude)*m%yield_stress
+          if (m%residual_strength <= m%yield_stress .and. weakest < m%residual_strength) &
+            call errors%add('the weak patch is weaker than residual_strength', &
+              where=place_of(group, 'amplitude'), found=number_text(p%amplitude), &
+              allowed='(1 - amplitude) yield_stress at least ' &
+              //number_text(m%residual_strength)//' [Pa]')
+        end associate
+      end do
     end associate
   end subroutine check_imperfection
 
@@ -391,7 +422,12 @@ contains
     type(namelist_group_t), intent(in)    :: group
     type(error_list_t),     intent(inout) :: errors
 
-    if (input%material%model == 'elastic') call errors%add( &
+    integer :: k
+
+    do k = 1, size(input%materials)
+      if (input%materials(k)%model /= 'elastic') return
+    end do
+    call errors%add( &
       'a random field of the yield stress for a material that does not yield', &
       where=place_of(group), found='model = ''elastic''', &
       allowed='model = ''j2'', or leave the group out')

@@ -1,6 +1,7 @@
 !> doc/input.md: the reference of the input file, written from the table of keys.
 module pd_input_reference
-  use pd_keys, only: allowed_values, group_key_t, group_table, key_t, key_table, kind_text
+  use pd_key_table, only: group_table, key_table
+  use pd_keys, only: allowed_values, group_key_t, key_t, kind_text
   implicit none
   private
 
@@ -47,13 +48,13 @@ contains
     character(:), allocatable :: text
 
     if (group%required .and. group%repeats) then
-      text = 'Must be there, several times if need be.'
+      text = 'Must be given; may be given several times.'
     else if (group%required) then
-      text = 'Must be there, once.'
+      text = 'Must be given once.'
     else if (group%repeats) then
-      text = 'May be left out, may stand several times.'
+      text = 'May be left out; may be given several times.'
     else
-      text = 'May be left out, may stand once.'
+      text = 'May be left out; may be given once.'
     end if
   end function standing
 
@@ -80,7 +81,7 @@ contains
 
     call put(unit, '# The input file')
     call put(unit, '')
-    call put(unit, 'Written by `perigeo --input-reference`; change `src/input/pd_keys.f90` and')
+    call put(unit, 'Written by `perigeo --input-reference`; change `src/input/pd_input_types.f90` and')
     call put(unit, '`src/input/pd_input_reference.f90`, not this page.')
     call put(unit, '')
     call put(unit, 'A run is described by one text file of Fortran namelist groups. A group')

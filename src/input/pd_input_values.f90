@@ -4,8 +4,9 @@
 !> `take_` procedures then only fetch: the value given, else the default, else nothing.
 module pd_input_values
   use pd_errors, only: error_list_t
-  use pd_keys, only: allowed_values, find_group, find_key, group_key_t, group_table, key_t, &
-    key_table, keys_of, kind_integer, kind_text, words_of
+  use pd_key_table, only: group_table, key_table
+  use pd_keys, only: allowed_values, find_group, find_key, group_key_t, key_t, keys_of, &
+    kind_integer, kind_text, words_of
   use pd_kinds, only: is_set, unset, wp
   use pd_namelist, only: max_problems, namelist_entry_t, namelist_group_t, namelist_value_t, &
     place_of
@@ -283,49 +284,49 @@ contains
   end function is_damaged
 
   !> A real number: as given, else its default, else `unset`.
-  subroutine take_real(group, name, x)
+  subroutine take_real(group, key, x)
     type(namelist_group_t), intent(in)  :: group
-    character(*),           intent(in)  :: name
+    type(key_t),            intent(in)  :: key
     real(wp),               intent(out) :: x
     character(:), allocatable :: problem, text
 
     x = unset
-    text = first_value(group, name)
+    text = first_value(group, key)
     if (text == '') return
     call read_number(text, x, problem)
     if (problem /= '') x = unset
   end subroutine take_real
 
   !> A whole number: as given, else its default, else 0.
-  subroutine take_integer(group, name, i)
+  subroutine take_integer(group, key, i)
     type(namelist_group_t), intent(in)  :: group
-    character(*),           intent(in)  :: name
+    type(key_t),            intent(in)  :: key
     integer,                intent(out) :: i
     character(:), allocatable :: problem
 
-    call read_integer(first_value(group, name), i, problem)
+    call read_integer(first_value(group, key), i, problem)
     if (problem /= '') i = 0
   end subroutine take_integer
 
   !> A text: as given, else its default, else empty.
-  subroutine take_text(group, name, text)
+  subroutine take_text(group, key, text)
     type(namelist_group_t),    intent(in)  :: group
-    character(*),              intent(in)  :: name
+    type(key_t),               intent(in)  :: key
     character(:), allocatable, intent(out) :: text
 
-    text = first_value(group, name)
+    text = first_value(group, key)
   end subroutine take_text
 
   !> All numbers of a key, size 0 where it is not given.
-  subroutine take_list(group, name, x)
+  subroutine take_list(group, key, x)
     type(namelist_group_t), intent(in)  :: group
-    character(*),           intent(in)  :: name
+    type(key_t),            intent(in)  :: key
     real(wp), allocatable,  intent(out) :: x(:)
     type(namelist_entry_t) :: entry
     character(:), allocatable :: problem
     integer :: i
 
-    i = group%find(name)
+    i = group%find(trim(key%name))
     if (i > 0) entry = group%entries(i)
     if (i == 0 .or. entry%damaged) then
       allocate (x(0))
@@ -338,33 +339,30 @@ contains
   end subroutine take_list
 
   !> A fixed number of numbers, which stay as they are where the key is not given.
-  subroutine take_vector(group, name, x)
+  subroutine take_vector(group, key, x)
     type(namelist_group_t), intent(in)    :: group
-    character(*),           intent(in)    :: name
+    type(key_t),            intent(in)    :: key
     real(wp),               intent(inout) :: x(:)
     real(wp), allocatable :: given(:)
 
-    call take_list(group, name, given)
+    call take_list(group, key, given)
     if (size(given) == size(x)) x = given
   end subroutine take_vector
 
   !> The first value of a key as text, else its default; empty where it is damaged.
-  function first_value(group, name) result(text)
+  pure function first_value(group, key) result(text)
     type(namelist_group_t), intent(in) :: group
-    character(*),           intent(in) :: name
+    type(key_t),            intent(in) :: key
     character(:), allocatable :: text
-    type(key_t),  allocatable :: keys(:)
     integer :: i
 
     text = ''
-    i = group%find(name)
-    if (i > 0) then
-      if (.not. group%entries(i)%damaged) text = group%entries(i)%values(1)%text
-      return
+    i = group%find(trim(key%name))
+    if (i == 0) then
+      text = trim(key%default)
+    else if (.not. group%entries(i)%damaged) then
+      text = group%entries(i)%values(1)%text
     end if
-    allocate (keys, source=key_table())
-    i = find_key(keys, group%name, name)
-    text = trim(keys(i)%default)
   end function first_value
 
 end module pd_input_values

@@ -10,7 +10,8 @@ module pd_load_checks
   use pd_kinds, only: is_set, wp
   use pd_motion_checks, only: check_increasing
   use pd_namelist, only: max_problems, namelist_group_t, place_of
-  use pd_platens, only: platen_under_load
+  use pd_platen_checks, only: platen_under_load
+  use pd_sides, only: normal_axis
   use pd_text, only: integer_text, number_text
   implicit none
   private
@@ -70,8 +71,7 @@ contains
       exit
     end do
     if (b%contact /= 'smooth' .or. size(b%traction) == 0) return
-    along = 1
-    if (b%side == 'left' .or. b%side == 'right') along = 2
+    along = merge(2, 1, normal_axis(b%side) == 1)
     if (abs(b%traction(along)) > 0.0_wp) call errors%add( &
       'a smooth boundary carries no traction along its side', &
       where=place_of(group, 'traction'), found=number_text(b%traction(along)), &
@@ -151,7 +151,7 @@ contains
       call check_increasing(p%span, 'span', group, errors)
       if (p%span(2) <= p%span(1) .or. p%side == '' .or. is_cloud(input)) return
       if (size(input%bodies) == 0 .or. .not. is_set(spacing)) return
-      if (p%side == 'bottom' .or. p%side == 'top') then
+      if (normal_axis(p%side) == 2) then
         lower = minval(input%bodies%x_min)
         upper = maxval(input%bodies%x_max)
       else

@@ -9,8 +9,9 @@ module pd_motion_checks
   use pd_input_values, only: group_named, is_damaged, is_given
   use pd_kinds, only: is_set, unset, wp
   use pd_namelist, only: max_problems, namelist_group_t, place_of
-  use pd_platens, only: approach_t, final_rate, largest_approach, platen_approach, platen_extent, &
-    platen_under_load
+  use pd_platen_checks, only: platen_approach, platen_extent, platen_under_load
+  use pd_sides, only: normal_axis
+  use pd_tables, only: table_t
   use pd_text, only: integer_text, number_text
   implicit none
   private
@@ -163,22 +164,16 @@ contains
     type(boundary_input_t), intent(in)    :: b
     type(namelist_group_t), intent(in)    :: group
     type(error_list_t),     intent(inout) :: errors
-    character(:), allocatable :: table
+    character(12), parameter :: tables(2) = [character(12) :: 'velocities_x', 'velocities_y']
     integer :: along
 
-    select case (b%side)
-    case ('bottom', 'top')
-      along = 1
-      table = 'velocities_x'
-    case ('left', 'right')
-      along = 2
-      table = 'velocities_y'
-    case default
+    if (normal_axis(b%side) == 0) then
       if (.not. is_damaged(group, 'side')) call errors%add( &
         'a smooth boundary without one side', where=place_of(group, 'side'), &
         found=''''//b%side//'''', allowed='''bottom'', ''top'', ''left'', ''right''')
       return
-    end select
+    end if
+    along = 3 - normal_axis(b%side)
     if (abs(b%velocity(along)) > 0.0_wp) call errors%add( &
       'a smooth boundary does not prescribe the motion along its side', &
       where=place_of(group, 'velocity'), found=number_text(b%velocity(along)), &
@@ -193,7 +188,7 @@ contains
 
       if (any(abs(values) > 0.0_wp)) call errors%add( &
         'a smooth boundary does not prescribe the motion along its side', &
-        where=place_of(group, table), found='values other than 0', &
+        where=place_of(group, tables(along)), found='values other than 0', &
         allowed='0, or contact = ''rough''')
     end subroutine check_zero
 
@@ -246,7 +241,7 @@ contains
     type(namelist_group_t), intent(in)    :: groups(:)
     type(error_list_t),     intent(inout) :: errors
     type(namelist_group_t) :: integration, output
-    type(approach_t) :: approach
+    type(table_t) :: approach
     real(wp) :: extent
 
     integration = group_named(groups, 'integration', 1, input%path)
@@ -287,17 +282,17 @@ contains
       type(namelist_group_t), intent(in) :: group
       character(*),           intent(in) :: key
 
-      if (final_rate(approach) > 0.0_wp) return
+      if (approach%final_rate() > 0.0_wp) return
       if (size(approach%times) == 1) then
         call errors%add('the platens do not approach each other', where=place_of(group, key), &
-                        found='rate of approach '//number_text(final_rate(approach)), &
+                        found='rate of approach '//number_text(approach%final_rate()), &
                         allowed='> 0 [m/s]')
       else if (is_set(extent)) then
-        if (largest_approach(approach, maxval(approach%times)) &
+        if (approach%largest_integral(maxval(approach%times)) &
             < strain*extent*(1.0_wp - 1.0e-9_wp)) &
           call errors%add('the platens never come that near', where=place_of(group, key), &
                           found=number_text(strain), allowed='at most ' &
-                          //number_text(largest_approach(approach, maxval(approach%times))/extent))
+                          //number_text(approach%largest_integral(maxval(approach%times))/extent))
       end if
     end subroutine check_reached
 
@@ -370,7 +365,7 @@ contains
     type(input_t), intent(in) :: input
     logical,       intent(in) :: as_strain
     real(wp) :: last
-    type(approach_t) :: approach
+    type(table_t) :: approach
     real(wp) :: extent
 
     associate (t => input%integration)
@@ -385,10 +380,10 @@ contains
       if (.not. is_set(extent)) return
       approach = platen_approach(input)
       if (as_strain .and. is_set(t%end_time)) then
-        last = largest_approach(approach, t%end_time)/extent
+        last = approach%largest_integral(t%end_time)/extent
       else if (is_set(t%final_strain) .and. size(approach%times) == 1 &
-               .and. final_rate(approach) > 0.0_wp) then
-        last = t%final_strain*extent/final_rate(approach)
+               .and. approach%final_rate() > 0.0_wp) then
+        last = t%final_strain*extent/approach%final_rate()
       end if
     end associate
   end function end_of_run

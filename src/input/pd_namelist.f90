@@ -36,6 +36,7 @@ module pd_namelist
   !> key = values. `damaged`: has been complained about, the values are not to be used.
   type :: namelist_entry_t
     character(:), allocatable :: key                   !! in small letters
+    character(:), allocatable :: source                !! where it stands, if not in the file
     integer :: line = 0
     logical :: damaged = .false.
     type(namelist_value_t), allocatable :: values(:)
@@ -155,6 +156,11 @@ contains
       if (i > 0) line = group%entries(i)%line
     end if
     place = group%file
+    if (present(key)) then
+      if (i > 0) then
+        if (allocated(group%entries(i)%source)) place = group%entries(i)%source
+      end if
+    end if
     if (line > 0) place = place//', line '//integer_text(line)
     place = place//', &'//shortened(group%name)
     if (present(key)) place = place//' '//shortened(key)

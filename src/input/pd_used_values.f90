@@ -2,9 +2,10 @@
 !> what differs from the run that a checkpoint belongs to.
 module pd_used_values
   use pd_errors, only: error_list_t
-  use pd_input_types, only: boundary_input_t, input_t, pressure_input_t
+  use pd_input_types, only: input_t
+  use pd_keys, only: group_key_t, key_t, key_visitor_t
   use pd_kinds, only: wp
-  use pd_text, only: integer_text, number_text, read_number, shortened
+  use pd_text, only: integer_text, number_text, numbers_text, read_number, shortened
   implicit none
   private
 
@@ -14,216 +15,128 @@ module pd_used_values
     character(:), allocatable :: text
   end type line_t
 
-  !> Lines that are collected one by one.
-  type :: lines_t
-    type(line_t), allocatable :: list(:)
+  !> Collects a line per key. Groups that may stand several times carry their name, or their number
+  !> where they have none: boundary(top).velocity, body(1).x_min; a material that stands alone has
+  !> no need of it.
+  type, extends(key_visitor_t) :: lister_t
+    type(line_t), allocatable :: lines(:)
     integer :: n = 0
+    type(group_key_t) :: here
+    character(:), allocatable :: stem
   contains
-    procedure :: add
-    procedure :: add_text
-    procedure :: add_real
-    procedure :: add_reals
-    procedure :: add_integer
-  end type lines_t
+    procedure :: group => list_group
+    procedure :: text => list_text
+    procedure :: number => list_number
+    procedure :: whole => list_whole
+    procedure :: numbers => list_numbers
+    procedure :: list => list_list
+    procedure, private :: add
+  end type lister_t
 
   character(*), parameter :: equals = ' = '
 
 contains
 
   !> All values as used, defaults included, in the order of the reference; numbers with as many
-  !> digits as read back to the same bits, 'none' where there is no value. Bodies carry their
-  !> number, boundaries and pressures their name: body(1).x_min, boundary(top).velocity.
+  !> digits as read back to the same bits, 'none' where there is no value.
   function used_values(input) result(values)
     type(input_t), intent(in) :: input
     character(:), allocatable :: values(:)
-    type(lines_t) :: lines
+    type(input_t)  :: shown
+    type(lister_t) :: lister
     integer :: i, longest
 
-    call add_run(input, lines)
-    do i = 1, size(input%boundaries)
-      call add_boundary(input%boundaries(i), lines)
-    end do
-    do i = 1, size(input%pressures)
-      call add_pressure(input%pressures(i), lines)
-    end do
-    call add_rest(input, lines)
+    shown = input   ! a visitor may change what it sees; this one does not
+    allocate (lister%lines(64))
+    call shown%visit(lister)
     longest = 1
-    do i = 1, lines%n
-      longest = max(longest, len(lines%list(i)%text))
+    do i = 1, lister%n
+      longest = max(longest, len(lister%lines(i)%text))
     end do
-    allocate (character(longest) :: values(lines%n))
-    do i = 1, lines%n
-      values(i) = lines%list(i)%text
+    allocate (character(longest) :: values(lister%n))
+    do i = 1, lister%n
+      values(i) = lister%lines(i)%text
     end do
   end function used_values
 
-  subroutine add_run(input, lines)
-    type(input_t), intent(in)    :: input
-    type(lines_t), intent(inout) :: lines
-    character(:), allocatable :: body
-    integer :: i
+  subroutine list_group(self, about)
+    class(lister_t),   intent(inout) :: self
+    type(group_key_t), intent(in)    :: about
 
-    call lines%add_text('run.name', input%run%name)
-    call lines%add_text('run.title', input%run%title)
-    call lines%add_text('run.output_dir', input%run%output_dir)
-    call lines%add_text('run.operators', input%run%operators)
-    associate (d => input%discretisation)
-      call lines%add_real('discretisation.spacing', d%spacing)
-      call lines%add_real('discretisation.horizon', d%horizon)
-      call lines%add_text('discretisation.layout', d%layout)
-      call lines%add_text('discretisation.volumes', d%volumes)
-      call lines%add_text('discretisation.influence', d%influence)
-      call lines%add_text('discretisation.fit', d%fit)
-    end associate
-    do i = 1, size(input%bodies)
-      body = 'body('//integer_text(i)//').'
-      call lines%add_text(body//'shape', input%bodies(i)%shape)
-      call lines%add_real(body//'x_min', input%bodies(i)%x_min)
-      call lines%add_real(body//'x_max', input%bodies(i)%x_max)
-      call lines%add_real(body//'y_min', input%bodies(i)%y_min)
-      call lines%add_real(body//'y_max', input%bodies(i)%y_max)
-      call lines%add_text(body//'file', input%bodies(i)%file)
-    end do
-    associate (m => input%material)
-      call lines%add_text('material.model', m%model)
-      call lines%add_text('material.strain_measure', m%strain_measure)
-      call lines%add_real('material.density', m%density)
-      call lines%add_real('material.youngs_modulus', m%youngs_modulus)
-      call lines%add_real('material.poissons_ratio', m%poissons_ratio)
-      call lines%add_real('material.yield_stress', m%yield_stress)
-      call lines%add_real('material.kinematic_modulus', m%kinematic_modulus)
-      call lines%add_real('material.isotropic_modulus', m%isotropic_modulus)
-      call lines%add_real('material.residual_strength', m%residual_strength)
-    end associate
-  end subroutine add_run
+    self%here = about
+    self%stem = trim(about%name)//'.'
+    if (about%repeats) self%stem = trim(about%name)//'('//integer_text(about%number)//').'
+    if (about%name == 'material' .and. about%of == 1) self%stem = 'material.'
+  end subroutine list_group
 
-  subroutine add_boundary(boundary, lines)
-    type(boundary_input_t), intent(in)    :: boundary
-    type(lines_t),          intent(inout) :: lines
-    character(:), allocatable :: stem
+  !> A name becomes part of the keys that follow.
+  subroutine list_text(self, key, value)
+    class(lister_t),           intent(inout) :: self
+    type(key_t),               intent(in)    :: key
+    character(:), allocatable, intent(inout) :: value
 
-    stem = 'boundary('//boundary%name//').'
-    call lines%add_text(stem//'side', boundary%side)
-    call lines%add_text(stem//'contact', boundary%contact)
-    call lines%add_reals(stem//'velocity', boundary%velocity)
-    call lines%add_reals(stem//'times', boundary%times)
-    call lines%add_reals(stem//'velocities_x', boundary%velocities_x)
-    call lines%add_reals(stem//'velocities_y', boundary%velocities_y)
-    call lines%add_reals(stem//'velocity_gradient', boundary%velocity_gradient)
-    call lines%add_reals(stem//'factors', boundary%factors)
-    call lines%add_reals(stem//'traction', boundary%traction)
-    call lines%add_real(stem//'ramp_time', boundary%ramp_time)
-  end subroutine add_boundary
+    if (key%name == 'name' .and. self%here%repeats) then
+      if (index(self%stem, '(') > 0) self%stem = trim(self%here%name)//'('//value//').'
+    else if (value == '') then
+      call self%add(key, 'none')
+    else
+      call self%add(key, value)
+    end if
+  end subroutine list_text
 
-  subroutine add_pressure(pressure, lines)
-    type(pressure_input_t), intent(in)    :: pressure
-    type(lines_t),          intent(inout) :: lines
-    character(:), allocatable :: stem
+  subroutine list_number(self, key, value)
+    class(lister_t), intent(inout) :: self
+    type(key_t),     intent(in)    :: key
+    real(wp),        intent(inout) :: value
 
-    stem = 'pressure('//pressure%name//').'
-    call lines%add_text(stem//'side', pressure%side)
-    call lines%add_reals(stem//'span', pressure%span)
-    call lines%add_real(stem//'value', pressure%value)
-    call lines%add_real(stem//'ramp_time', pressure%ramp_time)
-  end subroutine add_pressure
+    call self%add(key, number_text(value))
+  end subroutine list_number
 
-  subroutine add_rest(input, lines)
-    type(input_t), intent(in)    :: input
-    type(lines_t), intent(inout) :: lines
+  subroutine list_whole(self, key, value)
+    class(lister_t), intent(inout) :: self
+    type(key_t),     intent(in)    :: key
+    integer,         intent(inout) :: value
 
-    call lines%add_text('stabilisation.method', input%stabilisation%method)
-    call lines%add_real('stabilisation.factor', input%stabilisation%factor)
-    associate (t => input%integration)
-      call lines%add_real('integration.end_time', t%end_time)
-      call lines%add_real('integration.final_strain', t%final_strain)
-      call lines%add_text('integration.time_step_rule', t%time_step_rule)
-      call lines%add_real('integration.time_step', t%time_step)
-      call lines%add_real('integration.safety', t%safety)
-      call lines%add_real('integration.damping', t%damping)
-      call lines%add_text('integration.damping_frame', t%damping_frame)
-    end associate
-    associate (p => input%imperfection)
-      call lines%add_real('imperfection.amplitude', p%amplitude)
-      call lines%add_real('imperfection.x', p%x)
-      call lines%add_real('imperfection.y', p%y)
-      call lines%add_real('imperfection.radius', p%radius)
-    end associate
-    associate (f => input%random_field)
-      call lines%add_real('random_field.coefficient_of_variation', f%coefficient_of_variation)
-      call lines%add_real('random_field.correlation_length', f%correlation_length)
-      call lines%add_integer('random_field.seed', f%seed)
-    end associate
-    associate (o => input%output)
-      call lines%add_reals('output.frame_strains', o%frame_strains)
-      call lines%add_reals('output.frame_times', o%frame_times)
-      call lines%add_integer('output.frame_count', o%frame_count)
-      call lines%add_integer('output.history_count', o%history_count)
-      call lines%add_real('output.checkpoint_every', o%checkpoint_every)
-    end associate
-  end subroutine add_rest
+    call self%add(key, integer_text(value))
+  end subroutine list_whole
+
+  subroutine list_numbers(self, key, values)
+    class(lister_t), intent(inout) :: self
+    type(key_t),     intent(in)    :: key
+    real(wp),        intent(inout) :: values(:)
+
+    call self%add(key, numbers_text(values))
+  end subroutine list_numbers
+
+  subroutine list_list(self, key, values)
+    class(lister_t),       intent(inout) :: self
+    type(key_t),           intent(in)    :: key
+    real(wp), allocatable, intent(inout) :: values(:)
+
+    if (size(values) == 0) then
+      call self%add(key, 'none')
+    else
+      call self%add(key, numbers_text(values))
+    end if
+  end subroutine list_list
 
   subroutine add(self, key, value)
-    class(lines_t), intent(inout) :: self
-    character(*),   intent(in)    :: key, value
+    class(lister_t), intent(inout) :: self
+    type(key_t),     intent(in)    :: key
+    character(*),    intent(in)    :: value
     type(line_t), allocatable :: longer(:)
     integer :: i
 
-    if (.not. allocated(self%list)) allocate (self%list(64))
-    if (self%n == size(self%list)) then
-      allocate (longer(2*self%n))
+    if (self%n == size(self%lines)) then
+      allocate (longer(2 * self%n))
       do i = 1, self%n
-        call move_alloc(self%list(i)%text, longer(i)%text)
+        call move_alloc(self%lines(i)%text, longer(i)%text)
       end do
-      call move_alloc(longer, self%list)
+      call move_alloc(longer, self%lines)
     end if
     self%n = self%n + 1
-    self%list(self%n)%text = key//equals//value
+    self%lines(self%n)%text = self%stem//trim(key%name)//equals//value
   end subroutine add
-
-  subroutine add_text(self, key, text)
-    class(lines_t), intent(inout) :: self
-    character(*),   intent(in)    :: key, text
-
-    if (text == '') then
-      call self%add(key, 'none')
-    else
-      call self%add(key, text)
-    end if
-  end subroutine add_text
-
-  subroutine add_real(self, key, x)
-    class(lines_t), intent(inout) :: self
-    character(*),   intent(in)    :: key
-    real(wp),       intent(in)    :: x
-
-    call self%add(key, number_text(x))
-  end subroutine add_real
-
-  subroutine add_reals(self, key, x)
-    class(lines_t), intent(inout) :: self
-    character(*),   intent(in)    :: key
-    real(wp),       intent(in)    :: x(:)
-    character(26*size(x)) :: buffer
-    character(:), allocatable :: number
-    integer :: i, n
-
-    n = 0
-    do i = 1, size(x)
-      number = number_text(x(i))
-      if (i < size(x)) number = number//', '
-      buffer(n + 1:n + len(number)) = number
-      n = n + len(number)
-    end do
-    call self%add_text(key, buffer(:n))
-  end subroutine add_reals
-
-  subroutine add_integer(self, key, i)
-    class(lines_t), intent(inout) :: self
-    character(*),   intent(in)    :: key
-    integer,        intent(in)    :: i
-
-    call self%add(key, integer_text(i))
-  end subroutine add_integer
 
   !> Name every value in which a run that is to go on differs from the run so far.
   !>

@@ -1,30 +1,50 @@
-!> Pressure on a side of the body: which points carry how much of it.
+!> Pressure on a side of the body: a dead load, and which points carry how much of it.
 !>
 !> Families are cut off at a surface, so a homogeneous stress P is in equilibrium only with forces
 !> P N_i on the points near it. A pressure applies just these: N_i is its weight at a point. Loads
 !> on the outermost points alone would leave them with several times the stress.
 !> Source: doc/theory.md, section 7.
 module pd_pressure
-  use pd_boundary, only: boundary_t, table_t
-  use pd_geometry, only: body_t, side_number, side_t
   use pd_kinds, only: n_block, wp
+  use pd_loads, only: load_t
   use pd_operators, only: operators_t
+  use pd_point_sets, only: side_t
+  use pd_tables, only: new_ramp, table_t
+  use pd_text, only: integer_text, short_number
   implicit none
   private
 
-  public :: pressure_t, surface_vectors, spread_pressure
+  public :: pressure_t, new_pressure, spread_pressure, surface_vectors, surface_t
 
   !> A pressure on a side of the body.
-  type :: pressure_t
-    character(:), allocatable :: name, side
-    real(wp) :: span(2) = [-huge(1.0_wp), huge(1.0_wp)]   !! along the side [m]
-    real(wp) :: value = 0.0_wp                !! at full load [Pa]
-    type(table_t) :: factor                   !! on the value
+  type, extends(load_t) :: pressure_t
+    character(:), allocatable :: side
     integer :: axis = 0                       !! along which it pushes; 1: x, 2: y
     integer,  allocatable :: points(:)
     real(wp), allocatable :: force(:)         !! on each point at full load, along the axis [N/m]
     real(wp) :: length = 0.0_wp               !! of the side of the body that it acts on [m]
+    type(table_t) :: factor                   !! on the forces
+    real(wp), private :: value = 0.0_wp       !! at full load [Pa]
+    real(wp), private :: span(2) = [-huge(1.0_wp), huge(1.0_wp)]   !! along the side [m]
+    real(wp), private :: ramp_time = 0.0_wp   !! full load from then on [s]
+    logical,  private :: on_layers = .false.  !! layers that continue the body carry it too
+  contains
+    procedure :: add_forces
+    procedure :: work
+    procedure :: description
   end type pressure_t
+
+  !> What a pressure has to know of a side: its points and those below them.
+  type :: surface_t
+    type(side_t) :: side
+    integer, allocatable :: lines(:, :)       !! the points below each of the side, it included, 0:
+                                              !! none (2 depth + 2, points of the side)
+    integer  :: depth = 0                     !! rows below a surface with N_i
+    real(wp) :: spacing = 0.0_wp              !! dx [m]
+    real(wp), allocatable :: weights(:)       !! N_i along the normal, of all points (n) [m]
+    logical,  allocatable :: slides(:)        !! free along the normal: the body, layers that slide
+    logical,  allocatable :: in_body(:)       !! no layers (n)
+  end type surface_t
 
 contains
 
@@ -57,36 +77,48 @@ contains
     end do
   end subroutine surface_vectors
 
+  !> Pressure on a part of a side, which no point carries yet.
+  pure type(pressure_t) function new_pressure(name, side, value, span, ramp_time) result(pressure)
+    character(*), intent(in) :: name, side
+    real(wp),     intent(in) :: value         !! at full load [Pa]
+    real(wp),     intent(in) :: span(:)       !! from, to, along the side [m]; size 0: whole side
+    real(wp),     intent(in) :: ramp_time     !! full load from then on [s]
+
+    pressure%name = name
+    pressure%kind = 'pressure'
+    pressure%side = side
+    pressure%value = value
+    if (size(span) > 0) pressure%span = span
+    pressure%ramp_time = ramp_time
+    pressure%factor = new_ramp(ramp_time)
+  end function new_pressure
+
   !> Give each point its part of a pressure. Every line of points across the side carries the
   !> pressure on the part of the side that it owns within the span, by the weights N_i; a common
   !> factor makes the whole the pressure times the length. No points: nothing to act on.
-  subroutine spread_pressure(body, boundaries, vectors, spacing, depth, pressure)
-    type(body_t),     intent(in)    :: body
-    type(boundary_t), intent(in)    :: boundaries(:)
-    real(wp),         intent(in)    :: vectors(:, :)   !! N (n,2) [m]
-    real(wp),         intent(in)    :: spacing         !! dx [m]
-    integer,          intent(in)    :: depth           !! rows of points below a surface with N_i
-    type(pressure_t), intent(inout) :: pressure        !! in: all but axis, points, force, length
+  pure subroutine spread_pressure(surface, pressure)
+    type(surface_t),  intent(in)    :: surface
+    type(pressure_t), intent(inout) :: pressure
     real(wp), allocatable :: part(:), weight(:)
-    integer,  allocatable :: at(:, :), points(:)
+    integer,  allocatable :: points(:)
     real(wp) :: inwards
     integer  :: j, k, n
 
-    pressure%axis = merge(2, 1, pressure%side == 'bottom' .or. pressure%side == 'top')
-    inwards = merge(1.0_wp, -1.0_wp, pressure%side == 'bottom' .or. pressure%side == 'left')
-    associate (side => body%sides(side_number(pressure%side)), axis => pressure%axis)
+    associate (side => surface%side, lines => surface%lines, depth => surface%depth)
+      pressure%axis = side%axis
+      inwards = -real(side%outward, wp)
       allocate (part(size(side%points)))
-      call find_parts(body, boundaries, side, spacing, pressure, part)
-      call find_lines(body, side, axis, inwards * spacing, 2 * depth + 2, at)
+      call find_parts(surface, pressure, part)
       allocate (points((depth + 1) * size(part)), weight((depth + 1) * size(part)))
       n = 0
       do k = 1, size(part)
         if (part(k) <= 0.0_wp) cycle
-        do j = 1, min(depth + 1, max(1, length_of(at(:, k)) / 2))   ! the rest is the other side's
-          if (.not. slides(body, boundaries, at(j, k), axis)) cycle
+        ! the other half of a line is the other side's
+        do j = 1, min(depth + 1, max(1, length_of(lines(:, k)) / 2))
+          if (.not. surface%slides(lines(j, k))) cycle
           n = n + 1
-          points(n) = at(j, k)
-          weight(n) = vectors(at(j, k), axis) * part(k) / (side%to(k) - side%from(k))
+          points(n) = lines(j, k)
+          weight(n) = surface%weights(lines(j, k)) * part(k) / (side%to(k) - side%from(k))
         end do
       end do
     end associate
@@ -94,6 +126,7 @@ contains
     allocate (pressure%points(n), source=points(:n))
     allocate (pressure%force(n), source=weight(:n))
     if (n > 0) pressure%force = inwards * pressure%value * sum(part) / sum(weight(:n)) * weight(:n)
+    pressure%on_layers = .not. all(surface%in_body(pressure%points))
   end subroutine spread_pressure
 
   !> The length of the side that each of its points stands for within the span, 0 where it does not
@@ -101,59 +134,27 @@ contains
   !>
   !> Where the span reaches an end of the side, and a layer stands there whose points slide, the
   !> layer is the body going on: it carries the pressure too.
-  subroutine find_parts(body, boundaries, side, spacing, pressure, part)
-    type(body_t),     intent(in)    :: body
-    type(boundary_t), intent(in)    :: boundaries(:)
-    type(side_t),     intent(in)    :: side
-    real(wp),         intent(in)    :: spacing
+  pure subroutine find_parts(surface, pressure, part)
+    type(surface_t),  intent(in)    :: surface
     type(pressure_t), intent(inout) :: pressure
     real(wp),         intent(out)   :: part(:)   !! [m]
     logical  :: carries(size(part))
     real(wp) :: ends(2), near
-    integer  :: k
 
-    near = 1.0e-6_wp * spacing
-    do k = 1, size(part)
-      carries(k) = slides(body, boundaries, side%points(k), pressure%axis)
-    end do
-    associate (lower => body%lower(3 - pressure%axis), upper => body%upper(3 - pressure%axis))
+    near = 1.0e-6_wp * surface%spacing
+    associate (side => surface%side, lower => surface%side%lower, upper => surface%side%upper)
+      carries = surface%slides(side%points)
       ends = [max(pressure%span(1), lower), min(pressure%span(2), upper)]
       pressure%length = sum(max(0.0_wp, min(side%to, ends(2)) - max(side%from, ends(1))), &
-        mask=body%boundary(side%points) == 0)
+        mask=surface%in_body(side%points))
       if (ends(1) <= lower + near .and. any(carries .and. side%to < lower + near)) &
         ends(1) = minval(side%from)
       if (ends(2) >= upper - near .and. any(carries .and. side%from > upper - near)) &
         ends(2) = maxval(side%to)
+      part = merge(min(side%to, ends(2)) - max(side%from, ends(1)), 0.0_wp, carries)
     end associate
-    part = merge(min(side%to, ends(2)) - max(side%from, ends(1)), 0.0_wp, carries)
     where (part <= near) part = 0.0_wp
   end subroutine find_parts
-
-  !> Numbers of the points below each point of a side, it included, 0: none.
-  subroutine find_lines(body, side, axis, step, count, at)
-    type(body_t), intent(in) :: body
-    type(side_t), intent(in) :: side
-    integer,      intent(in) :: axis                  !! across the side
-    real(wp),     intent(in) :: step                  !! to the next point inwards [m]
-    integer,      intent(in) :: count
-    integer, allocatable, intent(out) :: at(:, :)     !! (count, points of the side)
-    integer, allocatable :: line(:)
-    integer :: i, j, k
-
-    allocate (at(count, size(side%points)), source=0)
-    associate (x => body%position, first => side%points(1), last => side%points(size(side%points)))
-      allocate (line(0:nint((x(last, 3 - axis) - x(first, 3 - axis)) / abs(step))), source=0)
-      do k = 1, size(side%points)
-        line(nint((x(side%points(k), 3 - axis) - x(first, 3 - axis)) / abs(step))) = k
-      end do
-      do i = 1, body%n
-        j = nint((x(i, axis) - x(first, axis)) / step) + 1
-        k = nint((x(i, 3 - axis) - x(first, 3 - axis)) / abs(step))
-        if (j < 1 .or. j > count .or. k < 0 .or. k > ubound(line, 1)) cycle
-        if (line(k) > 0) at(j, line(k)) = i
-      end do
-    end associate
-  end subroutine find_lines
 
   !> How many points follow each other without a gap.
   pure integer function length_of(line) result(n)
@@ -165,17 +166,45 @@ contains
     n = size(line)
   end function length_of
 
-  !> Whether a point is free along an axis: all of the body, and layers that slide.
-  pure logical function slides(body, boundaries, point, axis)
-    type(body_t),     intent(in) :: body
-    type(boundary_t), intent(in) :: boundaries(:)
-    integer,          intent(in) :: point, axis
+  !> f <- f + factor force / V at the points.
+  pure subroutine add_forces(self, volume, t, f)
+    class(pressure_t), intent(in)    :: self
+    real(wp),          intent(in)    :: volume(:), t
+    real(wp),          intent(inout) :: f(:, :)
+    real(wp) :: factor
+    integer  :: k
 
-    slides = .true.
-    if (body%boundary(point) == 0) return
-    associate (boundary => boundaries(body%boundary(point)))
-      slides = .not. (boundary%prescribed(axis) .or. boundary%held(axis))
+    factor = self%factor%rate(t)
+    associate (points => self%points, axis => self%axis)
+      do k = 1, size(points)
+        f(points(k), axis) = f(points(k), axis) + factor * self%force(k) / volume(points(k))
+      end do
     end associate
-  end function slides
+  end subroutine add_forces
+
+  pure real(wp) function work(self, v, t, t_next)
+    class(pressure_t), intent(in) :: self
+    real(wp),          intent(in) :: v(:, :), t, t_next
+    real(wp) :: power
+    integer  :: k
+
+    power = 0.0_wp
+    do k = 1, size(self%points)
+      power = power + self%force(k) * v(self%points(k), self%axis)
+    end do
+    work = (t_next - t) * (0.5_wp * (self%factor%rate(t) + self%factor%rate(t_next))) * power
+  end function work
+
+  pure function description(self) result(text)
+    class(pressure_t), intent(in) :: self
+    character(:), allocatable :: text
+
+    text = self%name//': '//short_number(self%value)//' Pa on '//self%side//', '// &
+      short_number(self%length)//' m of the body'
+    if (self%on_layers) text = text//' and layers that continue it'
+    text = text//', '//integer_text(size(self%points))//' points: '// &
+      short_number(abs(sum(self%force)))//' N/m in all'
+    if (self%ramp_time > 0.0_wp) text = text//', whole from '//short_number(self%ramp_time)//' s'
+  end function description
 
 end module pd_pressure

@@ -6,9 +6,7 @@
 !> next.
 !> Source: doc/theory.md, sections 2 to 5 and 7.
 module pd_forces
-  use pd_boundary, only: boundary_forces
   use pd_kinds, only: n_block, wp
-  use pd_loads, only: apply_loads
   use pd_materials, only: materials_t
   use pd_model, only: model_t
   use pd_operators, only: operators_t
@@ -27,7 +25,7 @@ contains
   !> `work`: what each block has dissipated in this step.
   !> `failed_row`: 0, or the first row whose det F is not positive (NaN included).
   subroutine forces(model, t, state, work, timing, failed_row)
-    type(model_t),      intent(inout) :: model   !! its boundaries get their new forces
+    type(model_t),      intent(inout) :: model   !! its supports get their new forces
     real(wp),           intent(in)    :: t       !! [s]
     type(state_t),      intent(inout) :: state
     type(block_work_t), intent(inout) :: work
@@ -37,8 +35,9 @@ contains
     associate (points => model%points)
       call internal_forces(model%operators, model%materials, points%volume, state, work, timing, &
         failed_row)
-      call apply_loads(model%pressures, model%boundaries, points%volume, t, state%force)
-      call boundary_forces(points%position, points%volume, t, state%force, model%boundaries)
+      call model%loads%add_forces(points%volume, t, state%force)
+      call model%supports%share_forces(points%volume, t, state%force)
+      call model%supports%take_reactions(points%volume, t, state%force)
     end associate
     call timing%lap(kernel_boundaries)
   end subroutine forces

@@ -1,22 +1,22 @@
 !> The model: everything about a run that does not change while it runs.
 module pd_model
   use pd_blocks, only: blocks_t
-  use pd_boundary, only: boundary_t, move, platens_t, reference_ends
   use pd_geometry, only: body_t
   use pd_kinds, only: wp
-  use pd_loads, only: apply_loads
+  use pd_loads, only: loads_t
   use pd_materials, only: materials_t
   use pd_operators, only: operators_t
+  use pd_platens, only: platens_t, reference_ends
   use pd_points, only: points_t
-  use pd_pressure, only: pressure_t
   use pd_state, only: state_t
+  use pd_supports, only: supports_t
   implicit none
   private
 
   public :: model_t, frame_t, start, damping_frame
 
-  !> Everything about a run that does not change while it runs, and the boundaries with the forces
-  !> of the present step.
+  !> Everything about a run that does not change while it runs, and the supports with the forces of
+  !> the present step.
   type :: model_t
     type(body_t)      :: body
     class(operators_t), allocatable :: operators
@@ -24,8 +24,8 @@ module pd_model
     type(blocks_t)    :: blocks              !! of the rows of all fields
     type(points_t)    :: points
     type(platens_t)   :: platens
-    type(boundary_t), allocatable :: boundaries(:)
-    type(pressure_t), allocatable :: pressures(:)
+    type(supports_t)  :: supports
+    type(loads_t)     :: loads
     real(wp), allocatable :: strength(:)     !! initial strength of the points (n) [Pa]
     real(wp) :: spacing = 0.0_wp             !! dx [m]
     real(wp) :: delta = 0.0_wp               !! horizon [m]
@@ -47,10 +47,10 @@ contains
     real(wp),      intent(in) :: t   !! [s]
 
     if (model%damped_in_frame) &
-      call reference_ends(model%platens, model%boundaries, t, frame%lower, frame%upper)
+      call reference_ends(model%platens, t, frame%lower, frame%upper)
   end function damping_frame
 
-  !> State at t = 0: undeformed, moving with the frame of the damping, boundaries with theirs; loads
+  !> State at t = 0: undeformed, moving with the frame of the damping, supports with theirs; loads
   !> without a ramp act already.
   subroutine start(model, state)
     type(model_t), intent(inout) :: model
@@ -65,8 +65,9 @@ contains
       state%velocity(:, k) = frame%lower(k) + (frame%upper(k) - frame%lower(k)) * model%points%place
       where (model%points%volume <= 0.0_wp) state%velocity(:, k) = 0.0_wp
     end do
-    call move(model%boundaries, model%points%position, 0.0_wp, state%displacement, state%velocity)
-    call apply_loads(model%pressures, model%boundaries, model%points%volume, 0.0_wp, state%force)
+    call model%supports%prescribe(0.0_wp, state%displacement, state%velocity)
+    call model%loads%add_forces(model%points%volume, 0.0_wp, state%force)
+    call model%supports%share_forces(model%points%volume, 0.0_wp, state%force)
     call model%operators%take_in(state%displacement)
   end subroutine start
 

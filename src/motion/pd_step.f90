@@ -2,12 +2,10 @@
 !>
 !> Source: doc/theory.md, section 6.
 module pd_step
-  use pd_boundary, only: motion_work, move
   use pd_clock, only: clock_t
   use pd_forces, only: forces
   use pd_kinds, only: wp
   use pd_ledger, only: ledger_t
-  use pd_loads, only: load_work
   use pd_model, only: damping_frame, model_t
   use pd_state, only: block_work_t, state_t
   use pd_timing, only: kernel_boundaries, kernel_motion, timing_t
@@ -35,30 +33,30 @@ contains
   subroutine take_step(clock, whole, model, state, work, ledger, timing, failed_row)
     type(clock_t),     intent(inout) :: clock
     logical,           intent(in)    :: whole
-    type(model_t),     intent(inout) :: model          !! its boundaries get their new forces
+    type(model_t),     intent(inout) :: model          !! its supports get their new forces
     type(state_t),     intent(inout) :: state
     type(step_work_t), intent(inout) :: work
     type(ledger_t),    intent(inout) :: ledger
     type(timing_t),    intent(inout) :: timing
     integer,           intent(out)   :: failed_row
-    real(wp) :: t, t_next, loads_work
+    real(wp) :: t, t_next
 
     t = clock%time()
     call clock%advance()
     t_next = clock%time()
     call timing%begin(clock%step)
-    associate (points => model%points, dt => clock%time_step, blocks => work%blocks)
+    associate (dt => clock%time_step, blocks => work%blocks)
       call move_points(kicks_t(second=work%open, first=.true.), model, damping_frame(model, t), &
         dt, state, blocks)
       if (work%open) call enter_damping(blocks%damping(1:2, :), ledger)
       call enter_damping(blocks%damping(3:4, :), ledger)
       call timing%lap(kernel_motion)
-      call move(model%boundaries, points%position, t_next, state%displacement, state%velocity)
-      loads_work = load_work(model%pressures, model%boundaries, state%velocity, t, t_next)
+      call model%supports%prescribe(t_next, state%displacement, state%velocity)
       call timing%lap(kernel_boundaries)
       call forces(model, t_next, state, blocks, timing, failed_row)
       ledger%plastic = ledger%plastic + blocks%dissipated
-      ledger%outer_work = ledger%outer_work + (motion_work(model%boundaries, t, t_next) + loads_work)
+      ledger%outer_work = ledger%outer_work + (model%supports%work(state%velocity, t, t_next) &
+        + model%loads%work(state%velocity, t, t_next))
       work%open = .not. whole
       if (work%open) return
       call move_points(kicks_t(second=.true.), model, damping_frame(model, t_next), dt, state, &

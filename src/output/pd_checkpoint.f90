@@ -52,7 +52,7 @@ module pd_checkpoint
   end type reading_t
 
   integer, parameter :: head_length = 512
-  integer, parameter :: schema_version = 1
+  integer, parameter :: schema_version = 2
   character(*), parameter :: schema = 'perigeo checkpoint'
 
 contains

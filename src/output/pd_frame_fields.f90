@@ -35,6 +35,13 @@ module pd_frame_fields
       type(points_view_t), intent(in)  :: view
       real(wp),            intent(out), contiguous :: values(:, :)   !! (components,points)
     end subroutine field_of_points
+    !> Up to four numbers in each row of a block; row 1 is the first row of the block.
+    pure subroutine numbers_of_block(view, block, numbers)
+      import :: n_block, points_view_t, wp
+      type(points_view_t), intent(in)    :: view
+      integer,             intent(in)    :: block
+      real(wp),            intent(inout) :: numbers(n_block, 4)   !! out
+    end subroutine numbers_of_block
   end interface
 
 contains
@@ -87,63 +94,32 @@ contains
     call take(view%model, view%state%velocity, values)
   end subroutine velocity
 
-  !> Cauchy stress; a point that has failed (det F <= 0) has none: 0.
   subroutine stress(view, values)
     type(points_view_t), intent(in)  :: view
     real(wp),            intent(out), contiguous :: values(:, :)
 
-    call take(view%model, cauchy_stress(view), values)
+    call take_blocks(view, cauchy_of_block, values)
   end subroutine stress
 
   subroutine mises_stress(view, values)
     type(points_view_t), intent(in)  :: view
     real(wp),            intent(out), contiguous :: values(:, :)
-    real(wp), allocatable :: sigma(:, :)
-    integer :: i
 
-    allocate (sigma(4, size(values, 2)))
-    call take(view%model, cauchy_stress(view), sigma)
-    do i = 1, size(values, 2)
-      values(1, i) = von_mises(sigma(:, i))
-    end do
+    call take_blocks(view, mises_of_block, values)
   end subroutine mises_stress
 
   subroutine strain(view, values)
     type(points_view_t), intent(in)  :: view
     real(wp),            intent(out), contiguous :: values(:, :)
-    real(wp), allocatable :: rows(:, :)
-    real(wp) :: in_block(n_block, 4)
-    integer  :: block, lo, hi
 
-    associate (model => view%model, state => view%state)
-      allocate (rows(model%operators%n, 4), source=0.0_wp)
-      do block = 1, model%blocks%count
-        lo = model%blocks%lo(block)
-        hi = model%blocks%hi(block)
-        call model%materials%strain_block(block, state%displacement_gradient, in_block)
-        rows(lo:hi, :) = in_block(:hi - lo + 1, :)
-      end do
-      call take(model, rows, values)
-    end associate
+    call take_blocks(view, strain_of_block, values)
   end subroutine strain
 
   subroutine plastic_strain(view, values)
     type(points_view_t), intent(in)  :: view
     real(wp),            intent(out), contiguous :: values(:, :)
-    real(wp), allocatable :: rows(:, :)
-    real(wp) :: in_block(n_block)
-    integer  :: block, lo, hi
 
-    associate (model => view%model, state => view%state)
-      allocate (rows(model%operators%n, 1), source=0.0_wp)
-      do block = 1, model%blocks%count
-        lo = model%blocks%lo(block)
-        hi = model%blocks%hi(block)
-        call model%materials%plastic_strain_block(block, state%law_points_t, in_block)
-        rows(lo:hi, 1) = in_block(:hi - lo + 1)
-      end do
-      call take(model, rows, values)
-    end associate
+    call take_blocks(view, plastic_strain_of_block, values)
   end subroutine plastic_strain
 
   !> The rms of the zero-energy part of the deformation, weighted with omega V over the family, over
@@ -175,24 +151,65 @@ contains
     !$omp end parallel do
   end subroutine take
 
-  !> Cauchy stress in the rows of the fields; 0 where det F is not positive.
-  function cauchy_stress(view) result(rows)
-    type(points_view_t), intent(in) :: view
-    real(wp), allocatable :: rows(:, :)   !! xx yy zz xy [Pa]
-    real(wp) :: in_block(n_block, 4)
+  !> The values at the points of what comes block by block.
+  subroutine take_blocks(view, of_block, values)
+    type(points_view_t), intent(in)  :: view
+    procedure(numbers_of_block) :: of_block
+    real(wp),            intent(out), contiguous :: values(:, :)   !! (components,points)
+    real(wp), allocatable :: rows(:, :)
+    real(wp) :: numbers(n_block, 4)
     integer  :: block, lo, hi
 
-    allocate (rows(view%model%operators%n, 4), source=0.0_wp)
-    !$omp parallel do schedule(static) default(none) private(block, lo, hi, in_block) &
+    allocate (rows(view%model%operators%n, size(values, 1)), source=0.0_wp)
+    !$omp parallel do schedule(static) default(none) private(block, lo, hi, numbers) &
     !$omp shared(view, rows)
     do block = 1, view%model%blocks%count
       lo = view%model%blocks%lo(block)
       hi = view%model%blocks%hi(block)
-      call view%model%materials%cauchy_block(block, view%state%displacement_gradient, &
-        view%state%stress, in_block)
-      rows(lo:hi, :) = in_block(:hi - lo + 1, :)
+      call of_block(view, block, numbers)
+      rows(lo:hi, :) = numbers(:hi - lo + 1, :size(rows, 2))
     end do
     !$omp end parallel do
-  end function cauchy_stress
+    call take(view%model, rows, values)
+  end subroutine take_blocks
+
+  !> Cauchy stress; a point that has failed (det F <= 0) has none: 0.
+  pure subroutine cauchy_of_block(view, block, numbers)
+    type(points_view_t), intent(in)    :: view
+    integer,             intent(in)    :: block
+    real(wp),            intent(inout) :: numbers(n_block, 4)
+
+    call view%model%materials%cauchy_block(block, view%state%displacement_gradient, &
+      view%state%stress, numbers)
+  end subroutine cauchy_of_block
+
+  pure subroutine mises_of_block(view, block, numbers)
+    type(points_view_t), intent(in)    :: view
+    integer,             intent(in)    :: block
+    real(wp),            intent(inout) :: numbers(n_block, 4)
+    integer :: b
+
+    call cauchy_of_block(view, block, numbers)
+    do b = 1, view%model%blocks%hi(block) - view%model%blocks%lo(block) + 1
+      numbers(b, 1) = von_mises(numbers(b, :))
+    end do
+  end subroutine mises_of_block
+
+  pure subroutine strain_of_block(view, block, numbers)
+    type(points_view_t), intent(in)    :: view
+    integer,             intent(in)    :: block
+    real(wp),            intent(inout) :: numbers(n_block, 4)
+
+    call view%model%materials%strain_block(block, view%state%displacement_gradient, numbers)
+  end subroutine strain_of_block
+
+  pure subroutine plastic_strain_of_block(view, block, numbers)
+    type(points_view_t), intent(in)    :: view
+    integer,             intent(in)    :: block
+    real(wp),            intent(inout) :: numbers(n_block, 4)
+
+    call view%model%materials%plastic_strain_block(block, view%state%law_points_t, &
+      numbers(:, 1))
+  end subroutine plastic_strain_of_block
 
 end module pd_frame_fields

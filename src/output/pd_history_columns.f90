@@ -28,8 +28,8 @@ contains
     call add(columns, column_t('time', 's', 'step times time step', value=time))
     if (model%platens%axis > 0) call add(columns, column_t('strain', '1', &
       'nominal strain between the platens, compression positive', value=strain))
-    do k = 1, size(model%boundaries)
-      call add_force(columns, model%boundaries(k)%name, k)
+    do k = 1, size(model%supports%items)
+      call add_force(columns, model%supports%items(k)%support%name, k)
     end do
     call add(columns, column_t('mean_stress_xx', 'Pa', 'mean first Piola-Kirchhoff stress P_xx'// &
       in_body, joined=mean, part=stress_xx))
@@ -177,7 +177,7 @@ contains
   pure real(wp) function force(row) result(value)
     type(row_view_t), intent(in) :: row
 
-    value = row%model%boundaries(row%boundary)%force(row%component)
+    value = row%model%supports%items(row%boundary)%support%force(row%component)
   end function force
 
   pure real(wp) function plastic_dissipation(row) result(value)

@@ -6,12 +6,12 @@
 !> Source: doc/theory.md, section 10.
 module pd_observe
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
-  use pd_boundary, only: nominal_strain
   use pd_clock, only: clock_t
   use pd_kinds, only: block_sum, n_block, wp
   use pd_labels, only: label_t
   use pd_ledger, only: ledger_t
   use pd_model, only: model_t
+  use pd_platens, only: nominal_strain
   use pd_state, only: state_t
   implicit none
   private
@@ -28,8 +28,8 @@ module pd_observe
     type(ledger_t) :: ledger
   end type moment_t
 
-  !> A block of rows lo to hi of the fields as the columns see it; row 1 of the arrays is row lo. Rows
-  !> behind the last one are 0, for sums go over whole blocks.
+  !> A block of rows lo to hi of the fields as the columns see it; row 1 of the arrays is row lo.
+  !> Rows behind the last one are 0, for sums go over whole blocks.
   type :: block_view_t
     type(model_t), pointer :: model => null()
     type(state_t), pointer :: state => null()
@@ -95,8 +95,7 @@ contains
 
     moment%step = clock%step
     moment%time = clock%time()
-    if (model%platens%axis > 0) moment%strain = nominal_strain(model%platens, model%boundaries, &
-      clock%time(), state%displacement)
+    moment%strain = nominal_strain(model%platens, state%displacement)
     moment%ledger = ledger
   end function moment_at
 

@@ -15,8 +15,8 @@ module pd_record
   use pd_input, only: compare_used, used_values
   use pd_input_types, only: input_t
   use pd_kinds, only: wp
-  use pd_model, only: model_t
   use pd_ledger, only: ledger_t
+  use pd_model, only: model_t
   use pd_observe, only: column_t, moment_at, moment_t, observation_t, observe
   use pd_progress, only: close_progress, open_progress, progress_t, say, show_progress, status_t
   use pd_result, only: add_row, create_result, finish_result, places_t, result_exists, result_t, &
@@ -132,9 +132,9 @@ contains
     description%boundary = model%body%boundary
     if (size(model%materials%remembered()) > 0) &
       description%yield_stress = model%strength(model%operators%storage%row)
-    allocate (character(64) :: description%boundary_names(size(model%boundaries)))
-    do k = 1, size(model%boundaries)
-      description%boundary_names(k) = model%boundaries(k)%name
+    allocate (character(64) :: description%boundary_names(size(model%supports%items)))
+    do k = 1, size(model%supports%items)
+      description%boundary_names(k) = model%supports%items(k)%support%name
     end do
     call frame_fields(description%fields)
     call history_columns(model, description%columns)
@@ -213,8 +213,9 @@ contains
       status%has_strain = .true.
       moment = moment_at(clock, model, state, record%moment%ledger)
       status%strain = moment%strain
-      status%axial_stress = &
-        model%boundaries(model%platens%first)%force(model%platens%axis) / model%platens%width
+      associate (first => model%supports%items(model%platens%first)%support)
+        status%axial_stress = first%force(model%platens%axis) / model%platens%width
+      end associate
     end if
     call show_progress(record%progress, status, errors)
   end subroutine record_progress
@@ -261,8 +262,8 @@ contains
     call write_checkpoint(record%stem, checkpoint, kept, errors)
   end subroutine save_checkpoint
 
-  !> Read the newest checkpoint and compare its input with the present one. The state has one row per
-  !> point.
+  !> Read the newest checkpoint and compare its input with the present one. The state has one row
+  !> per point.
   !>
   !> Errors, `file_errors`: no checkpoint that can be read; `input_errors`: values that differ.
   subroutine load_checkpoint(input, checkpoint, state, ledger, warning, file_errors, input_errors)

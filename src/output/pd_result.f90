@@ -24,7 +24,7 @@ module pd_result
   implicit none
   private
 
-  public :: places_t, result_t
+  public :: places_t, result_t, bunch
   public :: create_result, resume_result, add_row, write_rows, write_frame, write_failed_frame
   public :: finish_result, result_exists
 
@@ -35,7 +35,7 @@ module pd_result
   end type places_t
 
   !> Rows that wait for being written together.
-  integer, parameter :: bunch = 250
+  integer, parameter :: bunch = 100
 
   !> A result file of a run that is going on; the file itself is closed between calls.
   type :: result_t

@@ -116,7 +116,8 @@ contains
       'volume of a point per unit of thickness'), errors)
     call write_dataset(file, '/points/boundary', description%boundary, errors)
     call write_label(file, '/points/boundary', label_t('', '1', &
-      'boundary that a fictitious point belongs to, counted from 1; 0: a point of the body'), errors)
+      'boundary that a fictitious point belongs to, counted from 1; 0: a point of the body'), &
+      errors)
     if (allocated(description%yield_stress)) then
       call write_dataset(file, '/points/yield_stress', description%yield_stress, errors)
       call write_label(file, '/points/yield_stress', label_t('', 'Pa', &

@@ -37,24 +37,43 @@ contains
   subroutine set_up_materials(input, model)
     type(input_t), intent(in)    :: input
     type(model_t), intent(inout) :: model
+    integer,  allocatable :: material_of(:)
     real(wp), allocatable :: strength(:)
+    integer :: k
 
-    allocate (model%materials%list(1))
-    associate (m => input%material, material => model%materials%list(1))
-      material%name = 'material'
-      material%density = m%density
-      material%youngs_modulus = m%youngs_modulus
-      allocate (material%measure, source=new_measure(m%strain_measure))
-      allocate (material%law, source=new_law(m))
-      call divide_into_runs(model%blocks, &
-        model%operators%storage%spread(spread(1, 1, model%body%n)), model%materials)
-      allocate (strength(model%body%n))
-      call set_up_strength(input, model%body%position, strength)
-      model%strength = model%operators%storage%spread(strength)
-      if (input%stabilisation%method == 'silling') call set_up_control( &
-        input%stabilisation%factor, m%youngs_modulus, model)
+    allocate (model%materials%list(size(input%materials)))
+    do k = 1, size(input%materials)
+      associate (given => input%materials(k), material => model%materials%list(k))
+        material%name = given%name
+        material%density = given%density
+        material%youngs_modulus = given%youngs_modulus
+        allocate (material%measure, source=new_measure(given%strain_measure))
+        allocate (material%law, source=new_law(given))
+      end associate
+    end do
+    allocate (material_of(model%body%n), strength(model%body%n))
+    associate (parts => material_of_parts(input))
+      material_of = parts(model%body%part)
     end associate
+    call divide_into_runs(model%blocks, model%operators%storage%spread(material_of), &
+      model%materials)
+    call set_up_strength(input, material_of, model%body%position, strength)
+    model%strength = model%operators%storage%spread(strength)
+    if (input%stabilisation%method == 'silling') &
+      call set_up_control(input%stabilisation%factor, material_of, model)
   end subroutine set_up_materials
+
+  !> Index of the material of every &body.
+  pure function material_of_parts(input) result(numbers)
+    type(input_t), intent(in) :: input
+    integer :: numbers(size(input%bodies)), j, k
+
+    do k = 1, size(numbers)
+      do j = size(input%materials), 1, -1
+        if (input%materials(j)%name == input%bodies(k)%material) numbers(k) = j
+      end do
+    end do
+  end function material_of_parts
 
   !> The law of a material.
   pure function new_law(given) result(law)
@@ -81,38 +100,45 @@ contains
     end select
   end function new_measure
 
-  !> Control of zero-energy modes after Silling: c_i = g C_0 / W_i with C_0 = 48 E / (5 pi delta^2).
-  subroutine set_up_control(factor, youngs_modulus, model)
+  !> Control of zero-energy modes after Silling, with the stiffness of each point's material.
+  subroutine set_up_control(factor, material_of, model)
     real(wp),      intent(in)    :: factor           !! g
-    real(wp),      intent(in)    :: youngs_modulus   !! E [Pa]
+    integer,       intent(in)    :: material_of(:)   !! of every point
     type(model_t), intent(inout) :: model
     real(wp), allocatable :: c(:)
 
-    allocate (c(model%operators%n), source=control_stiffness(factor, youngs_modulus, model%delta, &
-      model%operators%weight_sum))
-    where (model%points%volume <= 0.0_wp) c = 0.0_wp
-    call model%operators%set_control(c)
+    associate (storage => model%operators%storage)
+      allocate (c(storage%n))
+      c = control_stiffness(factor, model%materials%list(material_of)%youngs_modulus, &
+        model%delta, model%operators%weight_sum(storage%row))
+      call model%operators%set_control(storage%spread(c))
+    end associate
   end subroutine set_up_control
 
-  !> sigma_y0 of every point: the same everywhere or a random field, reduced in the weak patch.
-  subroutine set_up_strength(input, position, yield_stress)
+  !> sigma_y0 of every point: that of its material or a random field about it, reduced in the weak
+  !> patch.
+  subroutine set_up_strength(input, material_of, position, strength)
     type(input_t), intent(in)  :: input
+    integer,       intent(in)  :: material_of(:)             !! of every point
     real(wp),      intent(in),  contiguous :: position(:, :)    !! X (n,2) [m]
-    real(wp),      intent(out), contiguous :: yield_stress(:)   !! (n) [Pa]
-    integer :: i
+    real(wp),      intent(out), contiguous :: strength(:)       !! (n) [Pa]
+    real(wp) :: mean
+    integer  :: i
 
-    associate (mean => max(0.0_wp, input%material%yield_stress), field => input%random_field, &
-      flaw => input%imperfection)
-      yield_stress = mean
-      if (is_set(field%coefficient_of_variation)) then
-        call standard_normal(new_random_field(field%correlation_length, field%seed), position, &
-          yield_stress)
-        yield_stress = lognormal(mean, field%coefficient_of_variation, yield_stress)
-      end if
-      if (flaw%amplitude <= 0.0_wp) return
-      do i = 1, size(yield_stress)
+    associate (field => input%random_field, flaw => input%imperfection)
+      strength = 0.0_wp
+      if (is_set(field%coefficient_of_variation)) call standard_normal( &
+        new_random_field(field%correlation_length, field%seed), position, strength)
+      do i = 1, size(strength)
+        mean = max(0.0_wp, input%materials(material_of(i))%yield_stress)
+        if (is_set(field%coefficient_of_variation)) then
+          strength(i) = lognormal(mean, field%coefficient_of_variation, strength(i))
+        else
+          strength(i) = mean
+        end if
+        if (flaw%amplitude <= 0.0_wp) cycle
         if (norm2(position(i, :) - [flaw%x, flaw%y]) <= flaw%radius * (1.0_wp + 1.0e-6_wp)) &
-          yield_stress(i) = (1.0_wp - flaw%amplitude) * yield_stress(i)
+          strength(i) = (1.0_wp - flaw%amplitude) * strength(i)
       end do
     end associate
   end subroutine set_up_strength

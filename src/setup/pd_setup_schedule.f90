@@ -1,11 +1,11 @@
 !> From checked input to the time step, the end of the run, and when something is written.
 module pd_setup_schedule
-  use pd_boundary, only: time_of_strain
   use pd_clock, only: clock_t
   use pd_errors, only: error_list_t
   use pd_input_types, only: input_t
   use pd_kinds, only: is_set, wp
   use pd_model, only: model_t
+  use pd_platens, only: time_of_strain
   use pd_schedule, only: new_schedule, schedule_t
   use pd_stability, only: find_highest_frequency
   implicit none
@@ -74,7 +74,7 @@ contains
       real(wp), intent(in) :: strain
       character(24) :: text
 
-      time = time_of_strain(model%platens, model%boundaries, strain)
+      time = time_of_strain(model%platens, strain)
       if (time > 0.0_wp) return
       write (text, '(g0.6)') strain
       call errors%add('the motion of the platens never reaches a nominal strain', &

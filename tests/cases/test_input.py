@@ -1,5 +1,7 @@
 """Wrong input: every mistake is named, the exit status is 2, and nothing is written."""
 
+import json
+import subprocess
 from pathlib import Path
 
 import pytest
@@ -191,3 +193,128 @@ def test_the_reference_page_is_what_the_program_writes(perigeo, tmp_path):
     done = perigeo(["--input-reference"], tmp_path)
     assert done.returncode == 0, done.stderr
     assert done.stdout == (ROOT / "doc" / "input.md").read_text()
+
+
+# ---- values of the command line, several materials
+
+
+LAYERS = """
+&run
+  name = 'layers'
+/
+&discretisation
+  spacing = 0.1
+  horizon = 0.3
+/
+&body
+  x_min = 0.0, x_max = 1.0, y_min = 0.0, y_max = 1.0
+  material = 'clay'
+/
+&body
+  x_min = 0.0, x_max = 1.0, y_min = 1.0, y_max = 2.0
+/
+&material
+  name = 'sand'
+  model = 'elastic'
+  density = 2000.0
+  youngs_modulus = 5.0e7
+  poissons_ratio = 0.3
+/
+&material
+  name = 'clay'
+  model = 'elastic'
+  density = 1800.0
+  youngs_modulus = 1.0e7
+  poissons_ratio = 0.4
+/
+&boundary
+  name = 'bottom', side = 'bottom'
+/
+&boundary
+  name = 'top', side = 'top', velocity = 0.0, -0.01
+/
+&integration
+  end_time = 1.0e-3
+/
+"""
+
+
+def printed(run_case, tmp_path, text, *options):
+    done = run_case(text, tmp_path, "--print-input", *options)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def test_what_is_printed_reads_back_to_the_same(run_case, tmp_path):
+    first = printed(run_case, tmp_path, LAYERS, "--set", "boundary.top.velocity=0,-0.02")
+    assert "\n  velocity = 0.0, -0.02 " in first
+    assert printed(run_case, tmp_path, first) == first
+
+
+def test_settings_take_the_place_of_values_in_the_file(run_case, tmp_path):
+    shown = printed(
+        run_case,
+        tmp_path,
+        LAYERS,
+        *("--set", "run.title=it's layered"),
+        *("--set", "material.clay.density=1700"),
+        *("--set", "body.2.y_max=3.0"),
+        *("--set", "stabilisation.method=silling", "--set", "stabilisation.factor=0.1"),
+        *("--set", "integration.end_time=2.0", "--set", "integration.end_time=3.0"),
+    )
+    for line in (
+        "title = 'it''s layered'",
+        "density = 1700.0",
+        "density = 2000.0",
+        "y_max = 3.0",
+        "method = 'silling'",
+        "factor = 0.1",
+        "end_time = 3.0",
+    ):
+        assert f"\n  {line}" in shown, line
+
+
+@pytest.mark.parametrize(
+    ("setting", "said"),
+    [
+        ("nonsense", "a setting is not understood"),
+        ("run.title=", "a setting is not understood"),
+        ("boundry.velocity=1,2", "unknown group"),
+        ("boundary.velocity=1,2", "which group is meant is not clear; found: 2 groups"),
+        ("boundary.left.velocity=1,2", "which group is meant is not clear"),
+        ("pressure.value=1.0", "which group is meant is not clear; found: 0 groups"),
+        ("run.tilte=x", "--set, &run tilte: unknown key, did you mean 'title'?"),
+        ("material.clay.density=heavy", "--set, &material density: text where a number is due"),
+        ("material.clay.density=-1", "--set, &material density: out of range"),
+        ("material.clay.name=sand", "two materials have one name"),
+        ("body.1.material=gravel", "there is no such material"),
+    ],
+)
+def test_wrong_settings_are_named(run_case, tmp_path, setting, said):
+    done = run_case(LAYERS, tmp_path, "--check", "--set", setting)
+    assert done.returncode == 2
+    assert said in done.stderr
+
+
+def test_several_materials_need_names(run_case, tmp_path):
+    done = run_case(LAYERS.replace("  name = 'sand'\n", ""), tmp_path, "--check")
+    assert done.returncode == 2
+    assert "&material name: the key is missing" in done.stderr
+
+
+def test_the_reference_for_programs_holds_every_key(program):
+    options = [str(program), "--input-reference"]
+    page = subprocess.run(options, capture_output=True, text=True, check=True).stdout
+    text = subprocess.run([*options, "--json"], capture_output=True, text=True, check=True).stdout
+    groups = json.loads(text)["groups"]
+    keys = {(group["name"], key["name"]): key for group in groups for key in group["keys"]}
+    assert len(keys) == page.count("\n| `")
+    spacing = keys["discretisation", "spacing"]
+    assert (spacing["type"], spacing["unit"], spacing["required"]) == ("real", "m", True)
+    assert spacing["range"] == {
+        "lower": 0.0,
+        "upper": None,
+        "lower_excluded": True,
+        "upper_excluded": False,
+    }
+    assert keys["discretisation", "layout"]["choices"] == ["nodes", "cells"]

@@ -4,6 +4,7 @@ import random
 import signal
 import subprocess
 import time
+from pathlib import Path
 
 import h5py
 import pytest
@@ -12,6 +13,9 @@ from case_files import SPECIMEN, changed, contents, history, same_points_and_fra
 # Long enough to be hit in the middle by a signal, with many rows and frames.
 LONG = changed(SPECIMEN, final_strain="0.04", history_count="400", spacing="0.05", horizon="0.16")
 LONG = LONG.replace("frame_strains = 0.004, 0.01", "frame_count = 20")
+# How many rows are written into the result file together: what the page on results says.
+PAGE = (Path(__file__).resolve().parents[2] / "doc" / "results.md").read_text()
+BUNCH = int(PAGE.split("in bunches: every ")[1].split()[0])
 END = "final_strain = 0.04"
 
 
@@ -119,9 +123,8 @@ def test_a_run_that_was_killed_goes_on_from_its_last_checkpoint(
         assert file["frames/000000/displacement"].shape == file["points/position"].shape
         for frame in file["frames"].values():
             assert frame["stress"].shape[1] == 4
-    # a bunch is 50 rows
     lines = (tmp_path / "out" / "case_history.csv").read_bytes().count(b"\n")
-    assert lines - 1 - 50 < stored_rows(tmp_path / "out") <= lines - 1
+    assert lines - 1 - BUNCH < stored_rows(tmp_path / "out") <= lines - 1
     done = run_case(LONG, tmp_path, "--restart", "--quiet")
     assert done.returncode == 0, done.stderr
     assert_same(tmp_path / "out", straight)
@@ -129,8 +132,8 @@ def test_a_run_that_was_killed_goes_on_from_its_last_checkpoint(
 
 def test_a_run_killed_between_checkpoints_keeps_the_rows_of_full_bunches(program, tmp_path):
     process = begin(program, tmp_path, LONG.replace("frame_count = 20", "frame_count = 1"))
-    assert stop(process, signal.SIGKILL, tmp_path, 130) == -9
-    assert stored_rows(tmp_path / "out") >= 100
+    assert stop(process, signal.SIGKILL, tmp_path, BUNCH + 20) == -9
+    assert stored_rows(tmp_path / "out") >= BUNCH
 
 
 def test_a_spoilt_checkpoint_is_passed_over(program, run_case, tmp_path, straight):
@@ -190,6 +193,20 @@ def test_a_restart_may_end_later(run_case, copy):
     rows = history(copy / "out" / "case_history.csv")
     assert rows["strain"][-1] >= 0.042
     assert (rows["step"][1:] > rows["step"][:-1]).all()
+    assert stored_rows(copy / "out") == len(rows["step"])
+
+
+@pytest.mark.parametrize("count", [20, 3000])
+def test_a_restart_may_ask_for_other_rows(run_case, copy, count):
+    before = stored_rows(copy / "out")
+    text = LONG.replace("history_count = 400", f"history_count = {count}")
+    done = run_case(text, copy, "--restart", "--quiet")
+    assert done.returncode == 0, done.stderr
+    rows = history(copy / "out" / "case_history.csv")
+    assert len(rows["step"]) > before
+    assert stored_rows(copy / "out") == len(rows["step"])
+    with h5py.File(copy / "out" / "case.h5", locking=False) as file:
+        assert file["history"].attrs["rows"] == len(rows["step"])
 
 
 def test_a_restart_may_ask_for_other_frames(run_case, copy, straight):

@@ -1,21 +1,29 @@
 !> Small bodies, fields and random numbers that the suites of the physics modules share.
 module samples
   use, intrinsic :: iso_fortran_env, only: int64
+  use pd_blocks, only: blocks_t, new_blocks
   use pd_bond_list, only: bond_list_t, new_bond_list
+  use pd_elastic, only: new_elastic
   use pd_errors, only: error_list_t
   use pd_families, only: horizon_t, new_horizon
-  use pd_force, only: control_stiffness, force_of => internal_force, force_state, solid_t
+  use pd_forces, only: internal_forces
   use pd_geometry, only: body_t, lattice_body, lattice_t, layer_t
-  use pd_j2, only: new_j2
+  use pd_green_lagrange, only: green_lagrange_t
   use pd_kinds, only: wp
-  use pd_kinematics, only: inverse_shape_tensor
+  use pd_law, only: flow_t, law_points_t, law_t
+  use pd_materials, only: divide_into_runs, material_t, materials_t
+  use pd_model, only: model_t
+  use pd_operators, only: control_stiffness, operators_t
+  use pd_shape_tensor, only: invert_shape_tensors
   use pd_state, only: block_work_t, state_t
   use pd_timing, only: timing_t
   implicit none
   private
 
-  public :: random_t, rectangle, sides, jittered_cloud, connect, material_of
-  public :: linear_map, rotation, internal_force
+  public :: random_t, rectangle, sides, jittered_cloud, connect, model_of
+  public :: new_material, materials_of, material_of, stress_at_point
+  public :: gradient_of, divergence_of, control_of, internal_force
+  public :: linear_map, rotation
 
   !> Pseudo-random numbers that are the same in every run (Lehmer's generator).
   type :: random_t
@@ -133,24 +141,89 @@ contains
     body%upper = maxval(body%position, dim=1)
   end function jittered_cloud
 
-  !> E = 50 MPa and 2000 kg/m^3 with Poisson's ratio 0.3 or another, elastic.
-  function material_of(n, poissons_ratio) result(solid)
-    integer,  intent(in)           :: n
-    real(wp), intent(in), optional :: poissons_ratio
-    type(solid_t) :: solid
+  !> A material of 2000 kg/m^3 or another density, with the strain of Green and Lagrange.
+  function new_material(law, density) result(material)
+    class(law_t), intent(in)           :: law
+    real(wp),     intent(in), optional :: density
+    type(material_t) :: material
 
-    solid%material = new_j2(50.0e6_wp, 0.3_wp)
-    if (present(poissons_ratio)) solid%material = new_j2(50.0e6_wp, poissons_ratio)
-    solid%density = 2000.0_wp
-    allocate (solid%yield_stress(n), source=0.15e6_wp)
+    material%name = 'soil'
+    allocate (material%law, source=law)
+    allocate (green_lagrange_t :: material%measure)
+    material%density = 2000.0_wp
+    if (present(density)) material%density = density
+    material%youngs_modulus = 50.0e6_wp
+  end function new_material
+
+  !> Materials of rows, 1 is the first, 2 the second. The blocks begin with row 1 unless given.
+  function materials_of(rows, first, second, blocks) result(materials)
+    integer,          intent(in)           :: rows(:)
+    type(material_t), intent(in)           :: first
+    type(material_t), intent(in), optional :: second
+    type(blocks_t),   intent(in), optional :: blocks
+    type(materials_t) :: materials
+
+    if (present(second)) then
+      allocate (materials%list(2))
+      materials%list(2) = second
+    else
+      allocate (materials%list(1))
+    end if
+    materials%list(1) = first
+    if (present(blocks)) then
+      call divide_into_runs(blocks, rows, materials)
+    else
+      call divide_into_runs(new_blocks(1, size(rows)), rows, materials)
+    end if
+  end function materials_of
+
+  !> One material in n rows: a law or, without one, E = 50 MPa with Poisson's ratio 0.3 or another.
+  function material_of(n, poissons_ratio, law, blocks) result(materials)
+    integer,        intent(in)           :: n
+    real(wp),       intent(in), optional :: poissons_ratio
+    class(law_t),   intent(in), optional :: law
+    type(blocks_t), intent(in), optional :: blocks
+    type(materials_t) :: materials
+    type(material_t)  :: material
+    real(wp) :: nu
+    integer  :: i
+
+    nu = 0.3_wp
+    if (present(poissons_ratio)) nu = poissons_ratio
+    if (present(law)) then
+      material = new_material(law)
+    else
+      material = new_material(new_elastic(50.0e6_wp, nu))
+    end if
+    materials = materials_of([(1, i=1, n)], material, blocks=blocks)
   end function material_of
 
-  !> Operators and K^-1 of a body; control of strength g where that is above 0.
-  subroutine connect(body, delta, solid, operators, g, influence)
-    type(body_t),      intent(in)    :: body
-    real(wp),          intent(in)    :: delta
-    type(solid_t),     intent(inout) :: solid
-    type(bond_list_t), intent(out)   :: operators
+  !> Stress of one point by a law; what it remembers goes from step n to n+1.
+  subroutine stress_at_point(law, strength, strain, history, stress, dissipated)
+    class(law_t), intent(in)    :: law
+    real(wp),     intent(in)    :: strength, strain(4)
+    real(wp),     intent(inout) :: history(:)
+    real(wp),     intent(inout) :: stress(4)   !! in: of step n
+    real(wp),     intent(out), optional :: dissipated
+    type(law_points_t) :: point
+    type(flow_t)       :: flow
+
+    allocate (point%stress(1, 4), source=reshape(stress, [1, 4]))
+    allocate (point%history(1, size(history)), source=reshape(history, [1, size(history)]))
+    allocate (point%strength(1), source=strength)
+    call law%stress_block(1, 1, 1, reshape(strain, [1, 4]), point, flow)
+    stress = point%stress(1, :)
+    history = point%history(1, :)
+    if (.not. present(dissipated)) return
+    dissipated = 0.0_wp
+    if (flow%n > 0) dissipated = flow%dissipated(1)
+  end subroutine stress_at_point
+
+  !> Operators of a body with their K^-1; control of strength g where that is above 0.
+  subroutine connect(body, delta, operators, g, influence)
+    type(body_t),      intent(in)  :: body
+    real(wp),          intent(in)  :: delta
+    type(bond_list_t), intent(out) :: operators
     real(wp),          intent(in), optional :: g
     character(*),      intent(in), optional :: influence
     type(error_list_t) :: errors
@@ -159,14 +232,97 @@ contains
     horizon = new_horizon(delta, 'gaussian')
     if (present(influence)) horizon = new_horizon(delta, influence)
     call new_bond_list(horizon, body%position, body%volume, operators, errors)
-    if (allocated(solid%k_inverse)) deallocate (solid%k_inverse)
-    allocate (solid%k_inverse(body%n, 3))
-    call inverse_shape_tensor(operators, body%position, body%volume, solid%k_inverse, errors)
+    call invert_shape_tensors(operators, body%position, body%volume, errors)
     if (errors%count() > 0) error stop 'samples: a body that cannot be connected'
     if (.not. present(g)) return
     if (g > 0.0_wp) &
       call operators%set_control(control_stiffness(g, 50.0e6_wp, delta, operators%weight_sum))
   end subroutine connect
+
+  !> The model of a body that nothing holds or loads, with a strength of 0.15 MPa everywhere.
+  !>
+  !> `free`: 0 where a component keeps its velocity; all move freely without it.
+  function model_of(body, delta, materials, g, free) result(model)
+    type(body_t),      intent(in) :: body
+    real(wp),          intent(in) :: delta
+    type(materials_t), intent(in) :: materials
+    real(wp),          intent(in), optional :: g, free(:, :)
+    type(model_t) :: model
+    type(bond_list_t), allocatable :: operators
+
+    allocate (operators)
+    call connect(body, delta, operators, g)
+    model%body = body
+    model%blocks = operators%domain%blocks
+    call move_alloc(operators, model%operators)
+    model%materials = materials
+    model%delta = delta
+    model%points%position = body%position
+    model%points%volume = body%volume
+    allocate (model%points%free(body%n, 2), source=1.0_wp)
+    if (present(free)) model%points%free = free
+    allocate (model%points%place(body%n), model%points%in_body(body%n), source=0.0_wp)
+    where (body%boundary == 0) model%points%in_body = 1.0_wp
+    allocate (model%strength(body%n), source=0.15e6_wp)
+    allocate (model%supports%items(0), model%loads%items(0))
+  end function model_of
+
+  !> G[u] of all rows.
+  subroutine gradient_of(operators, u, g)
+    class(operators_t), intent(inout) :: operators
+    real(wp), intent(in)  :: u(:, :)
+    real(wp), intent(out) :: g(:, :)
+    real(wp), allocatable :: field(:, :), sums(:, :)
+    integer :: block
+
+    field = u
+    allocate (sums(operators%n, 4), source=0.0_wp)
+    call operators%take_in(field)
+    associate (blocks => operators%domain%blocks)
+      do block = 1, blocks%count
+        call operators%gradient_sums_block(blocks%lo(block), blocks%hi(block), field, sums)
+      end do
+    end associate
+    g = sums
+  end subroutine gradient_of
+
+  !> D[A] of all rows.
+  subroutine divergence_of(operators, a, f)
+    class(operators_t), intent(in) :: operators
+    real(wp), intent(in)  :: a(:, :)
+    real(wp), intent(out) :: f(:, :)
+    real(wp), allocatable :: field(:, :), sums(:, :)
+    integer :: block
+
+    field = a
+    if (operators%weighs) field = spread(operators%share_of, 2, 4) * a
+    allocate (sums(operators%n, 2), source=0.0_wp)
+    associate (blocks => operators%domain%blocks)
+      do block = 1, blocks%count
+        call operators%divergence_sums_block(blocks%lo(block), blocks%hi(block), field, sums)
+      end do
+    end associate
+    f = sums
+  end subroutine divergence_of
+
+  !> f <- f + Z[u] of all rows.
+  subroutine control_of(operators, u, f)
+    class(operators_t), intent(inout) :: operators
+    real(wp), intent(in)    :: u(:, :)
+    real(wp), intent(inout) :: f(:, :)
+    real(wp), allocatable :: field(:, :), sums(:, :)
+    integer :: block
+
+    field = u
+    sums = f
+    call operators%take_in(field)
+    associate (blocks => operators%domain%blocks)
+      do block = 1, blocks%count
+        call operators%control_sums_block(blocks%lo(block), blocks%hi(block), field, sums)
+      end do
+    end associate
+    f = sums
+  end subroutine control_of
 
   !> u = (F - I) X with F as xx xy yx yy.
   function linear_map(f, x) result(u)
@@ -185,23 +341,20 @@ contains
     f = [cos(angle), -sin(angle), sin(angle), cos(angle)]
   end function rotation
 
-  !> Displacement gives F, S and the internal force density, control included.
-  subroutine internal_force(operators, solid, volume, state, dissipated, failed)
-    type(bond_list_t), intent(inout) :: operators
-    type(solid_t),     intent(in)    :: solid
-    real(wp),          intent(in)    :: volume(:)
-    type(state_t),     intent(inout) :: state
+  !> Displacement gives H, S and the internal force density, control included.
+  subroutine internal_force(operators, materials, volume, state, dissipated, failed)
+    class(operators_t), intent(inout) :: operators
+    type(materials_t),  intent(in)    :: materials
+    real(wp),           intent(in)    :: volume(:)
+    type(state_t),      intent(inout) :: state
     real(wp), intent(out), optional :: dissipated
     integer,  intent(out), optional :: failed
-    real(wp), allocatable :: a(:, :)
-    type(block_work_t) :: blocks
+    type(block_work_t) :: work
     type(timing_t) :: timing
     integer :: first
 
-    allocate (a(size(volume), 4))
-    call force_state(operators, solid, volume, state, a, blocks, timing, first)
-    call force_of(operators, state%displacement, a, state%force, blocks, timing)
-    if (present(dissipated)) dissipated = sum(blocks%dissipated)
+    call internal_forces(operators, materials, volume, state, work, timing, first)
+    if (present(dissipated)) dissipated = operators%domain%blocks%total(work%dissipated)
     if (present(failed)) failed = first
   end subroutine internal_force
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -47,7 +48,7 @@ def _info_text(facts: dict[str, Any]) -> str:
         f"  spacing      {facts['spacing']:g} m, horizon {facts['horizon']:g} m",
         f"  loading axis {facts['loading_axis'] or 'none (no platens)'}"
         + (f", boundaries: {', '.join(facts['boundaries'])}" if facts["boundaries"] else ""),
-        f"  fields       {', '.join(facts['fields']) or 'none written yet'}",
+        *_fields_text(facts),
         "  frames       number    step       time [s]    strain    largest plastic strain",
     ]
     for f in facts["frames"]:
@@ -63,10 +64,34 @@ def _info_text(facts: dict[str, Any]) -> str:
     return "\n".join(lines)
 
 
+def _fields_text(facts: dict[str, Any]) -> list[str]:
+    """The fields of the file with their units, then those derived from them."""
+    stored = facts["stored_fields"]
+    if not stored:
+        return ["  fields       none written yet"]
+    items = [
+        _named(name, about["unit"])
+        + (f" ({' '.join(about['components'])})" if about["components"] else "")
+        for name, about in stored.items()
+    ]
+    parts = {f"{name}_{part}" for name, about in stored.items() for part in about["components"]}
+    derived = [name for name in facts["fields"] if name not in stored and name not in parts]
+    lines = [f"  fields       {', '.join(items)}"]
+    return lines + ([f"  derived      {', '.join(derived)}"] if derived else [])
+
+
+def _named(name: str, unit: str) -> str:
+    return f"{name} [{unit}]" if unit else name
+
+
 def _history_text(history: dict[str, Any]) -> list[str]:
     if "missing" in history:
         return [f"  history      {history['missing']}"]
-    lines = [f"  history      {history['rows']} rows: {', '.join(history['columns'])}"]
+    columns = [_named(name, unit) for name, unit in history["columns"].items()]
+    lines = [
+        f"  history      {history['rows']} rows in {Path(history['file']).name}: "
+        f"{', '.join(columns)}"
+    ]
     if history.get("peak_stress") is not None and history["rows"]:
         lines.append(
             f"  peak stress  {history['peak_stress'] / 1e3:.2f} kPa at a strain of "

@@ -111,7 +111,7 @@ def stress_strain_figure(
         if np.isfinite(stress) and stress != 0.0:
             with style():
                 ax = figure.axes[0]
-                factor, unit = prefix_for(abs(stress), "Pa")
+                factor, unit = prefix_for(abs(stress), curves[0].y_unit)
                 ax.plot([100.0 * strain], [stress * factor], "o", color=COLOURS[1])
                 ax.annotate(
                     f"peak {stress * factor:.1f} {unit} at {100.0 * strain:.3f} %",
@@ -175,7 +175,7 @@ def band_figure(run: Run, measure: BandMeasure) -> Figure:
     """Where the bands lie (left) and the profile across the prevailing one (right)."""
     frame = run.frame(number=measure.frame)
     panel = panel_of(frame)
-    scale = common_scale([panel.values], "1")
+    scale = common_scale([panel.values], frame.scalar("plastic_strain").unit)
     x0, y0, x1, y1 = common_extent([panel])
     aspect = float((y1 - y0) / (x1 - x0))
     tall = min(95.0, 70.0 * aspect)
@@ -215,6 +215,7 @@ def _draw_bands(ax: Axes, measure: BandMeasure) -> None:
 def profile_figure(measures: Sequence[BandMeasure], labels: Sequence[str] | None = None) -> Figure:
     """Profiles of several frames or runs over the distance from their peaks."""
     names = labels or [m.label for m in measures]
+    first = measures[0].profile
     with style():
         figure = new_figure(SINGLE, 66.0)
         ax = figure.subplots()
@@ -225,7 +226,7 @@ def profile_figure(measures: Sequence[BandMeasure], labels: Sequence[str] | None
                 label=f"{name}: {m.width.width:.3f} m",
             )  # fmt: skip
         ax.set_xlabel("Distance from the peak along the line [m]")
-        ax.set_ylabel(with_unit(label_of("plastic_strain"), "1"))
+        ax.set_ylabel(with_unit(label_of(first.name), first.unit))
         ax.set_ylim(bottom=0.0)
         ax.legend(title=f"width at {100.0 * measures[0].width.level:g} % of the peak",
                   title_fontsize=7)  # fmt: skip
@@ -252,7 +253,7 @@ def compare_figure(
     curves = [
         stress_strain(r, tension_positive, label=n)
         for r, n in zip(runs, names)
-        if r.platens is not None and r.history_path.exists()
+        if r.platens is not None and r.has_history
     ]
     x0, y0, x1, y1 = common_extent(panels)
     aspect = float((y1 - y0) / (x1 - x0))

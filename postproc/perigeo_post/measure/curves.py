@@ -12,14 +12,7 @@ from ..read.points import BoolArray, FloatArray
 from ..read.run import Run
 
 MODULUS_RANGE = (2.0e-4, 1.0e-3)  # nominal strain, between which the modulus is fitted
-ENERGIES = (
-    "kinetic_energy",
-    "strain_energy",
-    "plastic_dissipation",
-    "damping_dissipation",
-    "stabilisation_energy",
-    "external_work",
-)
+ENERGY_UNITS = ("J/m", "J")
 
 
 @dataclass(frozen=True)
@@ -86,16 +79,17 @@ def stress_strain(
     """Axial stress against nominal strain, compression positive unless asked otherwise."""
     sign = -1.0 if tension_positive else 1.0
     stress = axial_stress(run, platen)
-    strain = run.history()["strain"]
+    history = run.history()
+    strain = history["strain"]
     count = min(len(stress), len(strain))  # a row may have been added between the two readings
     return Curve(
         label or label_of_run(run),
         sign * strain[:count],
         sign * stress[:count],
         "strain",
-        "1",
+        history.unit("strain"),
         "axial_stress",
-        "Pa",
+        "Pa",  # a force per thickness over a width
         tension_positive,
     )
 
@@ -118,11 +112,11 @@ def history_curve(
 
 
 def energy_curves(run: Run, against: str | None = None) -> list[Curve]:
-    """All energy columns that the history has."""
+    """All columns of the history that are energies by their units."""
     history = run.history()
-    there = [name for name in ENERGIES if name in history]
+    there = [name for name in history if history.unit(name) in ENERGY_UNITS]
     if not there:
-        raise RequestError(f"the history {run.history_path} has no energy columns")
+        raise RequestError(f"the history {history.path} has no energy columns")
     return [history_curve(run, name, against, name.replace("_", " ")) for name in there]
 
 

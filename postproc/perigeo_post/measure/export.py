@@ -53,7 +53,7 @@ def write_rows(
     path = Path(path)
     units = TABLE_UNITS if units is None else units
     names = list(dict.fromkeys(name for row in rows for name in row))
-    header = [f"{name} [{units[name]}]" if name in units else name for name in names]
+    header = [f"{name} [{units[name]}]" if units.get(name) else name for name in names]
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with path.open("w", newline="", encoding="utf-8") as file:
@@ -115,7 +115,7 @@ def write_bands(path: str | Path, measures: Sequence[BandMeasure]) -> Path:
 def write_points(path: str | Path, frames: Sequence[Frame], name: str) -> Path:
     """Values of a field at all points of some frames."""
     rows = []
-    unit = "1"
+    unit = ""
     for frame in frames:
         field = frame.scalar(name)
         unit = field.unit

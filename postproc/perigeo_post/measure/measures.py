@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -185,6 +186,7 @@ def run_facts(run: Run) -> dict[str, Any]:
             for f in frames
         ],
         "fields": run.field_names if good else [],
+        "stored_fields": {k: asdict(v) for k, v in run.stored_fields.items()} if good else {},
         "provenance": run.provenance,
     }
     facts["history"] = _history_facts(run)
@@ -200,6 +202,7 @@ def _history_facts(run: Run) -> dict[str, Any]:
         "file": str(history.path),
         "rows": history.rows,
         "columns": {name: history.unit(name) for name in history},
+        "descriptions": {name: history.description(name) for name in history},
     }
     if run.platens is not None:
         try:

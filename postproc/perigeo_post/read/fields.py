@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,9 +12,23 @@ from .errors import FieldNotFoundError
 from .points import FloatArray
 
 TENSOR = ("xx", "yy", "zz", "xy")
-DEFAULT_COMPONENTS: dict[int, tuple[str, ...]] = {2: ("x", "y"), 4: TENSOR}
-VECTORS = ("displacement", "velocity")
+# Of the fields of schema 1, for files whose datasets do not say
+FIRST_COMPONENTS: dict[str, tuple[str, ...]] = {
+    "displacement": ("x", "y"),
+    "velocity": ("x", "y"),
+    "stress": TENSOR,
+    "strain": TENSOR,
+}
 OF_THE_POINTS = ("yield_stress",)  # stand once in the file, and are the same in every frame
+
+
+@dataclass(frozen=True)
+class About:
+    """What a field means, without its values."""
+
+    unit: str  # "1" for a pure number, empty where the file does not say
+    description: str
+    components: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -66,19 +80,38 @@ def magnitude_of(field: Field) -> FloatArray:
 @dataclass(frozen=True)
 class _Derived:
     source: str
+    needs: tuple[str, ...]  # components of the source
     rule: Callable[[Field], FloatArray]
     description: str
 
+    def possible(self, components: tuple[str, ...]) -> bool:
+        """Whether a source with these components will do."""
+        return set(self.needs) <= set(components)
 
+
+_DIAGONAL = ("xx", "yy", "zz")
+_PLANE = ("xx", "yy", "xy")
 DERIVED: dict[str, _Derived] = {
-    "displacement_magnitude": _Derived("displacement", magnitude_of, "length of the displacement"),
-    "velocity_magnitude": _Derived("velocity", magnitude_of, "length of the velocity"),
-    "mean_stress": _Derived("stress", mean_of_tensor, "mean Cauchy stress, tension positive"),
-    "pressure": _Derived("stress", lambda f: -mean_of_tensor(f), "pressure, minus mean stress"),
-    "max_shear_stress": _Derived("stress", plane_shear_of, "largest shear stress in the plane"),
-    "von_mises": _Derived("stress", von_mises_of, "von Mises stress"),
-    "volumetric_strain": _Derived("strain", lambda f: 3.0 * mean_of_tensor(f), "xx + yy + zz"),
-    "max_shear_strain": _Derived("strain", plane_shear_of, "largest shear strain in the plane"),
+    "displacement_magnitude": _Derived(
+        "displacement", ("x", "y"), magnitude_of, "length of the displacement"
+    ),
+    "velocity_magnitude": _Derived("velocity", ("x", "y"), magnitude_of, "length of the velocity"),
+    "mean_stress": _Derived(
+        "stress", _DIAGONAL, mean_of_tensor, "mean Cauchy stress, tension positive"
+    ),
+    "pressure": _Derived(
+        "stress", _DIAGONAL, lambda f: -mean_of_tensor(f), "pressure, minus mean stress"
+    ),
+    "max_shear_stress": _Derived(
+        "stress", _PLANE, plane_shear_of, "largest shear stress in the plane"
+    ),
+    "von_mises": _Derived("stress", TENSOR, von_mises_of, "von Mises stress"),
+    "volumetric_strain": _Derived(
+        "strain", _DIAGONAL, lambda f: 3.0 * mean_of_tensor(f), "xx + yy + zz"
+    ),
+    "max_shear_strain": _Derived(
+        "strain", _PLANE, plane_shear_of, "largest shear strain in the plane"
+    ),
 }
 
 # Text on axes and colour bars
@@ -108,7 +141,7 @@ def label_of(name: str) -> str:
     if name in _LABELS:
         return _LABELS[name]
     source, _, component = name.rpartition("_")
-    if source in _SYMBOLS:
+    if source in _SYMBOLS and set(component) <= set("xyz"):
         words, symbol = _SYMBOLS[source]
         return f"{words} ${symbol}_{{{component}}}$"
     words = name.replace("_", " ")
@@ -126,7 +159,7 @@ def find(name: str, stored: Callable[[str], Field | None]) -> Field | None:
     if name in DERIVED:
         rule = DERIVED[name]
         source = stored(rule.source)
-        if source is not None:
+        if source is not None and rule.possible(source.components):
             return Field(name, rule.rule(source), source.unit, rule.description)
     source_name, _, component = name.rpartition("_")
     source = stored(source_name) if source_name else None
@@ -135,16 +168,19 @@ def find(name: str, stored: Callable[[str], Field | None]) -> Field | None:
     return None
 
 
-def available(stored: dict[str, int]) -> list[str]:
-    """All names, from the names of the stored fields and their numbers of dimensions."""
+def available(stored: Mapping[str, About]) -> list[str]:
+    """All names: of the stored fields, of their components, and of those derived from them."""
     names = []
-    for name, dimensions in stored.items():
+    for name, about in stored.items():
         names.append(name)
-        if dimensions == 2:
-            parts = DEFAULT_COMPONENTS[2] if name in VECTORS else TENSOR
-            names += [f"{name}_{part}" for part in parts]
-    names += [n for n, rule in DERIVED.items() if rule.source in stored and n not in names]
-    return names
+        names += [f"{name}_{part}" for part in about.components]
+    return names + [
+        name
+        for name, rule in DERIVED.items()
+        if name not in names
+        and rule.source in stored
+        and rule.possible(stored[rule.source].components)
+    ]
 
 
 def unknown(name: str, names: list[str]) -> FieldNotFoundError:

@@ -17,10 +17,10 @@ import h5py
 import numpy as np
 
 from .errors import ResultError, SchemaError
-from .fields import DEFAULT_COMPONENTS, Field
+from .fields import FIRST_COMPONENTS, About, Field
 
 SCHEMA = "perigeo result"
-SCHEMA_VERSIONS = (1,)
+SCHEMA_VERSIONS = (1, 2)
 T = TypeVar("T")
 _ATTEMPTS = 4  # a reading can fall into the moment in which the program writes
 _PAUSE = 0.15  # [s] between them
@@ -122,6 +122,24 @@ def checked_attributes(path: Path, file: Any) -> dict[str, Any]:
     return found
 
 
+def text_attribute(data: Any, name: str) -> str:
+    """An attribute of a dataset as text, empty where it has none."""
+    return str(plain(data.attrs.get(name, "")))
+
+
+def about_dataset(data: Any, name: str) -> About:
+    """Unit, description and components of a dataset, as its attributes say."""
+    parts: tuple[str, ...] = ()
+    if data.ndim == 2:
+        given = plain(data.attrs.get("components", ""))
+        parts = tuple(given if isinstance(given, list) else str(given).replace(",", " ").split())
+        if len(parts) != data.shape[1]:
+            parts = FIRST_COMPONENTS.get(name, ())
+        if len(parts) != data.shape[1]:
+            parts = tuple(str(k + 1) for k in range(data.shape[1]))
+    return About(text_attribute(data, "unit"), text_attribute(data, "description"), parts)
+
+
 def dataset(path: Path, key: str, name: str) -> Field | None:
     """A dataset with its unit, description and components; None where it is not there."""
 
@@ -129,20 +147,8 @@ def dataset(path: Path, key: str, name: str) -> Field | None:
         if key not in file:
             return None
         data = file[key]
-        attributes = {k: plain(v) for k, v in data.attrs.items()}
+        about = about_dataset(data, name)
         values = np.asarray(data[()], dtype=float)
-        given = attributes.get("components", "")
-        parts = given if isinstance(given, list) else str(given).replace(",", " ").split()
-        if values.ndim == 2 and len(parts) != values.shape[1]:
-            parts = list(DEFAULT_COMPONENTS.get(values.shape[1], ()))
-        if values.ndim == 1:
-            parts = []
-        return Field(
-            name,
-            values,
-            str(attributes.get("unit", "")),
-            str(attributes.get("description", "")),
-            tuple(str(p) for p in parts),
-        )
+        return Field(name, values, about.unit, about.description, about.components)
 
     return read(path, find)

@@ -1,9 +1,14 @@
-"""The history of a run: one row a record, columns with units."""
+"""The history of a run: one row per record, columns with units.
+
+Results of schema 2 hold it in their group /history, with unit and description of each column. The
+CSV beside them has the same numbers. The program fills the group in bunches, so while a run goes
+on, or after it was killed, the CSV may have rows that the group has not.
+"""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -11,49 +16,31 @@ import numpy as np
 import numpy.typing as npt
 
 from .errors import FieldNotFoundError, ResultError
+from .file import plain, read, text_attribute
+from .first_schema import column_meaning
 
 FloatArray = npt.NDArray[np.float64]
 
-# First match wins: (pattern, unit, description)
-_COLUMNS: list[tuple[str, str, str]] = [
-    (r"step$", "1", "number of the time step"),
-    (r"time$", "s", "time"),
-    (r"strain$", "1", "nominal strain between the platens, compression positive"),
-    (r"(?P<b>\w+)_force_(?P<c>[xyz])$", "N/m", "force of boundary '{b}' on the body, along {c}"),
-    (r"mean_stress_(?P<c>\w+)$", "Pa", "mean first Piola stress {c} of the body"),
-    (r"mean_strain_(?P<c>\w+)$", "1", "mean strain {c} of the body"),
-    (r"max_plastic_strain$", "1", "largest equivalent plastic strain in the body"),
-    (r"kinetic_energy$", "J/m", "kinetic energy"),
-    (r"strain_energy$", "J/m", "stored elastic energy"),
-    (r"plastic_dissipation$", "J/m", "plastic work, accumulated"),
-    (r"damping_dissipation$", "J/m", "work of the damping, accumulated"),
-    (r"stabilisation_energy$", "J/m", "work of the zero-energy control, accumulated"),
-    (r"external_work$", "J/m", "work of reactions and loads, accumulated"),
-    (r"energy_error$", "1", "relative error of the energy balance"),
-    # columns that may come later
-    (r".*displacement_\w$|.*position_\w$", "m", ""),
-    (r".*velocity_\w$", "m/s", ""),
-    (r".*stress.*|.*pressure$|.*traction.*", "Pa", ""),
-    (r".*strain.*", "1", ""),
-    (r".*force.*", "N/m", ""),
-    (r".*energy$|.*dissipation$|.*work$", "J/m", ""),
-]
 
+@dataclass(frozen=True)
+class Column:
+    """What a column of the history means."""
 
-def column_meaning(name: str) -> tuple[str, str]:
-    """Unit and description of a history column (empty where the name is not known)."""
-    for pattern, unit, text in _COLUMNS:
-        match = re.match(pattern, name)
-        if match:
-            return unit, text.format(**match.groupdict())
-    return "", ""
+    unit: str  # "1" for a pure number, empty where the file does not say
+    description: str
 
 
 class History(Mapping[str, FloatArray]):
-    """Columns of a history file by name: ``history["time"]`` is an array of all its rows."""
+    """Columns of a history by name: ``history["time"]`` is an array of all its rows."""
 
-    def __init__(self, columns: dict[str, FloatArray], path: Path | None = None) -> None:
+    def __init__(
+        self,
+        columns: dict[str, FloatArray],
+        path: Path | None = None,
+        meanings: Mapping[str, Column] | None = None,
+    ) -> None:
         self._columns = columns
+        self._meanings = meanings or {}
         self.path = path
 
     def __getitem__(self, name: str) -> FloatArray:
@@ -79,21 +66,27 @@ class History(Mapping[str, FloatArray]):
         return len(next(iter(self._columns.values()))) if self._columns else 0
 
     def unit(self, name: str) -> str:
-        """Unit of a column ("1" for a pure number)."""
-        self[name]
-        return column_meaning(name)[0]
+        """Unit of a column ("1" for a pure number, empty where the file does not say)."""
+        return self._meaning(name).unit
 
     def description(self, name: str) -> str:
         """What a column means, in a few words."""
-        self[name]
-        return column_meaning(name)[1]
+        return self._meaning(name).description
+
+    def _meaning(self, name: str) -> Column:
+        self[name]  # the error for a column that is not there
+        return self._meanings.get(name, Column("", ""))
+
+    def with_meanings_of(self, other: History) -> History:
+        """These rows, with the units and descriptions of another history."""
+        return History(self._columns, self.path, other._meanings)
 
     def __repr__(self) -> str:
         return f"History({self.rows} rows: {', '.join(self._columns)})"
 
 
 def read_history(path: str | Path) -> History:
-    """Read a history file.
+    """Read a history file in CSV form. Units are known for the columns of schema 1.
 
     A last line without its line end is one that is still being written (or was cut off): it is
     left out, even where it looks whole, because its last number may have lost digits.
@@ -120,7 +113,8 @@ def read_history(path: str | Path) -> History:
             raise ResultError(f"the history {path} is damaged at line {number}: {line[:60]!r}")
         rows.append(row)
     table: npt.NDArray[Any] = np.array(rows, dtype=float).reshape(len(rows), len(names))
-    return History({name: table[:, k].copy() for k, name in enumerate(names)}, path)
+    columns = {name: table[:, k].copy() for k, name in enumerate(names)}
+    return History(columns, path, {name: Column(*column_meaning(name)) for name in names})
 
 
 def _numbers(line: str, count: int) -> list[float] | None:
@@ -131,3 +125,58 @@ def _numbers(line: str, count: int) -> list[float] | None:
         return [float(cell.replace("D", "E").replace("d", "e")) for cell in cells]
     except ValueError:
         return None
+
+
+@dataclass(frozen=True)
+class StoredHistory:
+    """The history as a result file holds it."""
+
+    history: History
+    places: int  # rows that have a place in the file; those behind the written ones hold nothing
+
+    @property
+    def waits(self) -> bool:
+        """Whether rows are still missing: the run goes on, or it was killed, or it failed."""
+        return self.history.rows < self.places
+
+
+def stored_history(path: Path) -> StoredHistory | None:
+    """The group /history of a result; None where it has none (schema 1)."""
+
+    def find(file: Any) -> StoredHistory | None:
+        if "history" not in file:
+            return None
+        group = file["history"]
+        about = {key: plain(group.attrs[key]) for key in ("written", "rows", "columns")}
+        written = int(about["written"])
+        columns: dict[str, FloatArray] = {}
+        meanings: dict[str, Column] = {}
+        for name in str(about["columns"]).split():
+            data = group[name]
+            columns[name] = np.asarray(data[:written], dtype=float)
+            meanings[name] = Column(
+                text_attribute(data, "unit"), text_attribute(data, "description")
+            )
+        return StoredHistory(History(columns, path, meanings), int(about["rows"]))
+
+    return read(path, find)
+
+
+def with_later_rows(stored: StoredHistory, csv: Path) -> History:
+    """The history of the file, with the rows that only the CSV has so far.
+
+    They are taken where the CSV is that of the same run: the same columns, no more rows than the
+    file has places, and in the rows that both have the same numbers to the last bit. Otherwise (a
+    CSV left from another run, or a damaged one) the file alone counts.
+    """
+    history = stored.history
+    try:
+        longer = read_history(csv)
+    except ResultError:
+        return history
+    written = history.rows
+    if list(longer) != list(history) or not written < longer.rows <= stored.places:
+        return history
+    if not all(np.array_equal(longer[c][:written], history[c], equal_nan=True) for c in history):
+        return history
+    return longer.with_meanings_of(history)

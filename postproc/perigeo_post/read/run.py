@@ -19,9 +19,9 @@ import numpy.typing as npt
 
 from . import fields as _fields
 from .errors import FieldNotFoundError, FrameNotFoundError, ResultError
-from .fields import Field
-from .file import checked_attributes, dataset, plain, read, text_of
-from .history import History, read_history
+from .fields import About, Field
+from .file import about_dataset, checked_attributes, dataset, plain, read, text_of
+from .history import History, read_history, stored_history, with_later_rows
 from .points import BoolArray, FloatArray, PointSet
 
 T = TypeVar("T")
@@ -342,26 +342,35 @@ class Run:
         return frames[int(away.argmin())]
 
     @cached_property
-    def field_names(self) -> list[str]:
-        """Names of all fields: of the frames, stored and derived, and of the points."""
+    def stored_fields(self) -> dict[str, About]:
+        """Unit, description and components of the fields in the file, by name."""
 
-        def read(file: Any) -> dict[str, int]:
+        def read(file: Any) -> dict[str, About]:
             for name in sorted(file["frames"]):
-                group = file["frames"][name]
-                fixed = [key for key in _fields.OF_THE_POINTS if key in file["points"]]
-                return {key: len(group[key].shape) for key in group} | dict.fromkeys(fixed, 1)
+                found = {
+                    key: about_dataset(data, key) for key, data in file["frames"][name].items()
+                }
+                for key in _fields.OF_THE_POINTS:
+                    if key in file["points"]:
+                        found.setdefault(key, about_dataset(file["points"][key], key))
+                return found
             return {}
 
-        stored: dict[str, int] = self._read(read)
+        stored: dict[str, About] = self._read(read)
         if not stored:
             raise FieldNotFoundError(f"{self.path} holds no frame yet")
-        return _fields.available(stored)
+        return stored
+
+    @cached_property
+    def field_names(self) -> list[str]:
+        """Names of all fields: of the frames, stored and derived, and of the points."""
+        return _fields.available(self.stored_fields)
 
     # ---- history -------------------------------------------------------------------------
 
     @property
     def history_path(self) -> Path:
-        """The history file: beside the .h5, with its stem (or the name of the run)."""
+        """The history in CSV form: beside the .h5, with its stem (or the name of the run)."""
         beside = self.path.with_name(f"{self.path.stem}_history.csv")
         if not beside.exists():
             named = self.path.with_name(f"{self.name}_history.csv")
@@ -369,11 +378,25 @@ class Run:
                 return named
         return beside
 
+    @property
+    def has_history(self) -> bool:
+        """Whether there is a history, in the file or beside it."""
+        return self.history_path.exists() or self._read(lambda file: "history" in file)
+
     def history(self) -> History:
-        """The history so far (read anew each time)."""
-        if not self.history_path.exists():
-            raise ResultError(f"the history {self.history_path} is missing")
-        return read_history(self.history_path)
+        """The history so far (read anew each time).
+
+        That of the file, and of the CSV beside it the rows that the file does not have yet; the
+        CSV alone where the file holds no history (schema 1).
+        """
+        stored = stored_history(self.path)
+        csv = self.history_path
+        if stored is not None:
+            look = stored.waits and csv.exists()
+            return with_later_rows(stored, csv) if look else stored.history
+        if not csv.exists():
+            raise ResultError(f"the history {csv} is missing")
+        return read_history(csv)
 
 
 def _listed(frames: list[Frame]) -> str:

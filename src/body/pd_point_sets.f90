@@ -1,0 +1,70 @@
+!> Sets of points: what boundaries hold and what loads act on.
+!>
+!> A set is a name and the numbers of its points. How it came about (a layer of a lattice, a name
+!> in a cloud, a side) is settled here, before supports and loads see it.
+!> Source: doc/theory.md, section 7.
+module pd_point_sets
+  use pd_kinds, only: wp
+  implicit none
+  private
+
+  public :: point_set_t, side_t, boundary_set, lines_below
+
+  type :: point_set_t
+    character(:), allocatable :: name
+    integer, allocatable :: points(:)           !! ascending
+  end type point_set_t
+
+  !> The points of a lattice on the outermost line of its body at one side, layers that continue it
+  !> included, and the part of the side that each owns: half a spacing to either side with the
+  !> layout nodes, less at an end, the width of its cell with the layout cells.
+  type, extends(point_set_t) :: side_t
+    integer  :: axis = 0                        !! of the normal; 1: x, 2: y
+    integer  :: outward = 0                     !! direction of the outward normal, 1 or -1
+    real(wp) :: lower = 0.0_wp, upper = 0.0_wp  !! extent along the side without layers [m]
+    real(wp), allocatable :: from(:), to(:)     !! coordinate along the side, ascending [m]
+  end type side_t
+
+contains
+
+  !> The points of boundary k, in the order of their numbers.
+  pure type(point_set_t) function boundary_set(name, owner, k) result(set)
+    character(*), intent(in) :: name
+    integer,      intent(in) :: owner(:)        !! boundary of every point
+    integer,      intent(in) :: k
+    integer :: i
+
+    set%name = name
+    allocate (set%points(count(owner == k)))
+    set%points = pack([(i, i=1, size(owner))], owner == k)
+  end function boundary_set
+
+  !> Numbers of the points below each point of a side, it included, 0: none.
+  pure subroutine lines_below(side, position, spacing, count, lines)
+    type(side_t), intent(in) :: side
+    real(wp),     intent(in) :: position(:, :)  !! X (n,2) [m]
+    real(wp),     intent(in) :: spacing         !! dx [m]
+    integer,      intent(in) :: count           !! points in a line
+    integer, allocatable, intent(out) :: lines(:, :)   !! (count, points of the side)
+    integer, allocatable :: line(:)
+    real(wp) :: step                            ! to the next point inwards
+    integer  :: i, j, k
+
+    step = -real(side%outward, wp) * spacing
+    allocate (lines(count, size(side%points)), source=0)
+    associate (x => position, axis => side%axis, along => 3 - side%axis, &
+      first => side%points(1), last => side%points(size(side%points)))
+      allocate (line(0:nint((x(last, along) - x(first, along)) / spacing)), source=0)
+      do k = 1, size(side%points)
+        line(nint((x(side%points(k), along) - x(first, along)) / spacing)) = k
+      end do
+      do i = 1, size(position, 1)
+        j = nint((x(i, axis) - x(first, axis)) / step) + 1
+        k = nint((x(i, along) - x(first, along)) / spacing)
+        if (j < 1 .or. j > count .or. k < 0 .or. k > ubound(line, 1)) cycle
+        if (line(k) > 0) lines(j, line(k)) = i
+      end do
+    end associate
+  end subroutine lines_below
+
+end module pd_point_sets

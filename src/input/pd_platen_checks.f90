@@ -1,0 +1,100 @@
+!> Platens as the input describes them: which boundaries they are, and how they come together.
+module pd_platen_checks
+  use pd_input_types, only: boundary_input_t, input_t
+  use pd_kinds, only: is_set, unset, wp
+  use pd_sides, only: normal_axis, outward
+  use pd_tables, only: difference, new_table, table_t
+  implicit none
+  private
+
+  public :: platens_of, platen_approach, platen_extent, platen_under_load
+
+contains
+
+  !> Indices of the platens, the one at the lower end of their axis first: exactly two boundaries,
+  !> on opposite sides, neither affine; 0, 0 where there are none.
+  pure function platens_of(boundaries) result(platens)
+    type(boundary_input_t), intent(in) :: boundaries(:)
+    integer :: platens(2)
+
+    platens = 0
+    if (size(boundaries) /= 2) return
+    associate (a => boundaries(1), b => boundaries(2))
+      if (a%contact == 'affine' .or. b%contact == 'affine') return
+      if (normal_axis(a%side) /= normal_axis(b%side)) return
+      if (outward(a%side) < outward(b%side)) platens = [1, 2]
+      if (outward(a%side) > outward(b%side)) platens = [2, 1]
+    end associate
+  end function platens_of
+
+  !> Whether there are platens, and one of them moves under a load: how, only the run will tell.
+  pure logical function platen_under_load(input) result(found)
+    type(input_t), intent(in) :: input
+    integer :: i
+
+    found = .false.
+    if (input%platens(1) == 0) return
+    do i = 1, 2
+      found = found .or. size(input%boundaries(input%platens(i))%traction) > 0
+    end do
+  end function platen_under_load
+
+  !> Rate at which the platens of the input approach each other [m/s]. Needs platens, and tables as
+  !> long as times.
+  pure type(table_t) function platen_approach(input) result(approach)
+    type(input_t), intent(in) :: input
+
+    approach = difference(velocity_across(input%boundaries(input%platens(1))), &
+      velocity_across(input%boundaries(input%platens(2))))
+  end function platen_approach
+
+  !> Velocity of a boundary across its side [m/s].
+  pure type(table_t) function velocity_across(boundary) result(velocity)
+    type(boundary_input_t), intent(in) :: boundary
+
+    if (normal_axis(boundary%side) == 1) then
+      velocity = component(boundary%velocities_x, boundary%velocity(1))
+    else
+      velocity = component(boundary%velocities_y, boundary%velocity(2))
+    end if
+
+  contains
+
+    pure type(table_t) function component(rates, constant)
+      real(wp), intent(in) :: rates(:), constant
+
+      component = new_table(boundary%times, rates, constant)
+    end function component
+
+  end function velocity_across
+
+  !> Extent of the body between the platens as the set-up will make it [m]; `unset` where it is
+  !> not in the input.
+  pure real(wp) function platen_extent(input) result(extent)
+    type(input_t), intent(in) :: input
+    real(wp) :: lower, upper
+    integer  :: k
+    logical  :: upright
+
+    extent = unset
+    upright = normal_axis(input%boundaries(input%platens(1))%side) == 2
+    lower = huge(1.0_wp)
+    upper = -huge(1.0_wp)
+    if (size(input%bodies) == 0) return
+    do k = 1, size(input%bodies)
+      associate (b => input%bodies(k))
+        if (.not. (is_set(b%x_min) .and. is_set(b%x_max) .and. is_set(b%y_min) &
+                   .and. is_set(b%y_max))) return
+        lower = min(lower, merge(b%y_min, b%x_min, upright))
+        upper = max(upper, merge(b%y_max, b%x_max, upright))
+      end associate
+    end do
+    if (upper <= lower) return
+    extent = upper - lower
+    if (input%bodies(1)%shape == 'rectangle' .and. is_set(input%discretisation%spacing)) &
+      extent = floor(extent/input%discretisation%spacing + 0.5_wp + 1.0e-6_wp) &
+               *input%discretisation%spacing
+    if (extent <= 0.0_wp) extent = unset
+  end function platen_extent
+
+end module pd_platen_checks

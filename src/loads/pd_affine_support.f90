@@ -1,0 +1,104 @@
+!> Affine support: its points follow a homogeneous deformation about the origin.
+!>
+!>   u_i(t) = a(t) L X_i; the rate of a is a table
+!>
+!> Source: doc/theory.md, section 7.
+module pd_affine_support
+  use pd_kinds, only: wp
+  use pd_point_sets, only: point_set_t
+  use pd_supports, only: reaction, support_t
+  use pd_tables, only: table_t
+  implicit none
+  private
+
+  public :: affine_support_t, new_affine_support
+
+  type, extends(support_t) :: affine_support_t
+    type(table_t), private :: factor                     !! rate of a
+    real(wp), allocatable, private :: mode(:, :)         !! L X (2, its points) [m/s]
+    real(wp), private :: mass = 0.0_wp                   !! rho sum V |L X|^2 [J/m]
+    real(wp), private :: mode_force = 0.0_wp             !! conjugate to a [W/m]
+    real(wp), private :: mode_force_before = 0.0_wp      !! in the step before
+  contains
+    procedure :: mark_prescribed
+    procedure :: prescribe
+    procedure :: take_reactions
+    procedure :: work
+  end type affine_support_t
+
+contains
+
+  !> Support whose points follow v = factor(t) L X.
+  pure type(affine_support_t) function new_affine_support(set, gradient, factor, position, mass) &
+    result(support)
+    type(point_set_t), intent(in) :: set
+    real(wp),          intent(in) :: gradient(4)         !! L xx xy yx yy [1/s]
+    type(table_t),     intent(in) :: factor
+    real(wp),          intent(in) :: position(:, :)      !! X (n,2) [m]
+    real(wp),          intent(in) :: mass(:)             !! rho V of all points (n) [kg/m]
+    integer :: k
+
+    support%name = set%name
+    allocate (support%points(size(set%points)), source=set%points)
+    support%factor = factor
+    allocate (support%mode(2, size(set%points)))
+    do k = 1, size(set%points)
+      associate (x => position(set%points(k), :), m => support%mode(:, k))
+        m(1) = gradient(1) * x(1) + gradient(2) * x(2)
+        m(2) = gradient(3) * x(1) + gradient(4) * x(2)
+        support%mass = support%mass + mass(set%points(k)) * sum(m**2)
+      end associate
+    end do
+  end function new_affine_support
+
+  pure subroutine mark_prescribed(self, free)
+    class(affine_support_t), intent(in)    :: self
+    real(wp),                intent(inout) :: free(:, :)
+
+    free(self%points, :) = 0.0_wp
+  end subroutine mark_prescribed
+
+  pure subroutine prescribe(self, t, u, v)
+    class(affine_support_t), intent(in)    :: self
+    real(wp),                intent(in)    :: t
+    real(wp),                intent(inout) :: u(:, :), v(:, :)
+    real(wp) :: a, rate
+    integer  :: k
+
+    a = self%factor%integral(t)
+    rate = self%factor%rate(t)
+    do k = 1, size(self%points)
+      u(self%points(k), :) = a * self%mode(:, k)
+      v(self%points(k), :) = rate * self%mode(:, k)
+    end do
+  end subroutine prescribe
+
+  !> - sum V f, and - sum V f . L X.
+  pure subroutine take_reactions(self, volume, t, f)
+    class(affine_support_t), intent(inout) :: self
+    real(wp),                intent(in)    :: volume(:), t, f(:, :)
+    integer :: k, p
+
+    associate (unused => t)
+    end associate
+    self%mode_force_before = self%mode_force
+    self%mode_force = 0.0_wp
+    self%force = reaction(self%points, volume, f)
+    do k = 1, size(self%points)
+      p = self%points(k)
+      self%mode_force = self%mode_force - volume(p) * sum(f(p, :) * self%mode(:, k))
+    end do
+  end subroutine take_reactions
+
+  pure real(wp) function work(self, v, t, t_next)
+    class(affine_support_t), intent(in) :: self
+    real(wp),                intent(in) :: v(:, :), t, t_next
+
+    associate (unused => v)
+    end associate
+    work = 0.5_wp * (self%mode_force_before + self%mode_force) &
+      * (self%factor%integral(t_next) - self%factor%integral(t)) &
+      + 0.5_wp * self%mass * (self%factor%rate(t_next)**2 - self%factor%rate(t)**2)
+  end function work
+
+end module pd_affine_support

@@ -1,0 +1,141 @@
+!> Platen under a force: it stays plane and does not rotate, and moves as the force tells it.
+!>
+!> Its points all get the same force density, in the components in which they move as one,
+!>
+!>   f <- (sum V f + r(t) F) / sum V
+!>
+!> so that, having the same velocity, they keep it. F is a dead load; the mass of the platen is that
+!> of its points.
+!> Source: doc/theory.md, section 7.
+module pd_loaded_platen
+  use pd_kinds, only: wp
+  use pd_point_sets, only: point_set_t
+  use pd_supports, only: reaction, support_t
+  use pd_tables, only: new_ramp, table_t
+  use pd_text, only: short_number
+  implicit none
+  private
+
+  public :: loaded_platen_t, new_loaded_platen
+
+  type, extends(support_t) :: loaded_platen_t
+    logical,  private :: as_one(2) = .false.             !! components in which its points move so
+    real(wp), private :: traction(2) = 0.0_wp            !! from outside, at full load [Pa]
+    real(wp), private :: applied(2) = 0.0_wp             !! F, the same over its length [N/m]
+    type(table_t), private :: factor                     !! r
+    real(wp), private :: ramp_time = 0.0_wp              !! [s]
+  contains
+    procedure :: mark_prescribed
+    procedure :: prescribe
+    procedure :: share_forces
+    procedure :: take_reactions
+    procedure :: work
+    procedure :: description
+  end type loaded_platen_t
+
+contains
+
+  !> Platen under a traction over a length in each component; it has no effect in components in
+  !> which the points do not move as one.
+  pure type(loaded_platen_t) function new_loaded_platen(set, as_one, traction, length, ramp_time) &
+    result(platen)
+    type(point_set_t), intent(in) :: set
+    logical,           intent(in) :: as_one(2)
+    real(wp),          intent(in) :: traction(2)         !! at full load [Pa]
+    real(wp),          intent(in) :: length(2)           !! that carries x and y of it [m]
+    real(wp),          intent(in) :: ramp_time           !! full load from then on [s]
+
+    platen%name = set%name
+    platen%load_kind = 'traction'
+    allocate (platen%points(size(set%points)), source=set%points)
+    platen%as_one = as_one
+    platen%traction = traction
+    platen%applied = merge(traction * length, 0.0_wp, as_one)
+    platen%ramp_time = ramp_time
+    platen%factor = new_ramp(ramp_time)
+  end function new_loaded_platen
+
+  !> Nothing is prescribed.
+  pure subroutine mark_prescribed(self, free)
+    class(loaded_platen_t), intent(in)    :: self
+    real(wp),               intent(inout) :: free(:, :)
+
+    associate (unused => self, unchanged => free)
+    end associate
+  end subroutine mark_prescribed
+
+  !> Nothing is prescribed.
+  pure subroutine prescribe(self, t, u, v)
+    class(loaded_platen_t), intent(in)    :: self
+    real(wp),               intent(in)    :: t
+    real(wp),               intent(inout) :: u(:, :), v(:, :)
+
+    associate (unused => self, unused_t => t, unchanged_u => u, unchanged_v => v)
+    end associate
+  end subroutine prescribe
+
+  pure subroutine share_forces(self, volume, t, f)
+    class(loaded_platen_t), intent(in)    :: self
+    real(wp),               intent(in)    :: volume(:), t
+    real(wp),               intent(inout) :: f(:, :)
+    integer :: c
+
+    do c = 1, 2
+      if (self%as_one(c)) call share(self%points, self%factor%rate(t) * self%applied(c), volume, &
+        f(:, c))
+    end do
+  end subroutine share_forces
+
+  !> f <- (sum V f + force) / sum V at some points.
+  pure subroutine share(points, force, volume, f)
+    integer,  intent(in)    :: points(:)
+    real(wp), intent(in)    :: force       !! on all of the points [N/m]
+    real(wp), intent(in)    :: volume(:)   !! V (n) [m^2]
+    real(wp), intent(inout) :: f(:)        !! one component (n) [N/m^3]
+    real(wp) :: total, area
+    integer  :: k
+
+    total = force
+    area = 0.0_wp
+    do k = 1, size(points)
+      total = total + volume(points(k)) * f(points(k))
+      area = area + volume(points(k))
+    end do
+    do k = 1, size(points)
+      f(points(k)) = total / area
+    end do
+  end subroutine share
+
+  !> - sum V f of the internal forces: f contains the applied force as well.
+  pure subroutine take_reactions(self, volume, t, f)
+    class(loaded_platen_t), intent(inout) :: self
+    real(wp),               intent(in)    :: volume(:), t, f(:, :)
+
+    self%force = merge(reaction(self%points, volume, f), 0.0_wp, self%as_one) &
+      + self%factor%rate(t) * self%applied
+  end subroutine take_reactions
+
+  !> Work of the applied force on the motion of the platen.
+  pure real(wp) function work(self, v, t, t_next)
+    class(loaded_platen_t), intent(in) :: self
+    real(wp),               intent(in) :: v(:, :), t, t_next
+    integer :: c
+
+    work = 0.0_wp
+    do c = 1, 2
+      if (self%as_one(c)) work = work + (t_next - t) * 0.5_wp * (self%factor%rate(t) &
+        + self%factor%rate(t_next)) * self%applied(c) * v(self%points(1), c)
+    end do
+  end function work
+
+  pure function description(self) result(text)
+    class(loaded_platen_t), intent(in) :: self
+    character(:), allocatable :: text
+
+    text = short_number(self%traction(1))//', '//short_number(self%traction(2))//' Pa on '// &
+      self%name//': '//short_number(self%applied(1))//', '//short_number(self%applied(2))// &
+      ' N/m in all'
+    if (self%ramp_time > 0.0_wp) text = text//', whole from '//short_number(self%ramp_time)//' s'
+  end function description
+
+end module pd_loaded_platen

@@ -1,0 +1,188 @@
+!> From checked input to supports, platens and loads.
+!>
+!> Sides, layers and names become sets of points here: supports and loads see nothing else of a
+!> body.
+module pd_setup_loads
+  use pd_affine_support, only: new_affine_support
+  use pd_errors, only: error_list_t
+  use pd_input_types, only: boundary_input_t, input_t, pressure_input_t
+  use pd_kinds, only: wp
+  use pd_loaded_platen, only: new_loaded_platen
+  use pd_loads, only: load_t
+  use pd_model, only: model_t
+  use pd_platens, only: new_platens
+  use pd_point_sets, only: boundary_set, lines_below, point_set_t, side_t
+  use pd_pressure, only: new_pressure, pressure_t, spread_pressure, surface_t, surface_vectors
+  use pd_rigid_support, only: new_rigid_support
+  use pd_sides, only: normal_axis, side_number
+  use pd_supports, only: support_t
+  use pd_tables, only: new_table
+  implicit none
+  private
+
+  public :: set_up_supports, set_up_platens, set_up_loads
+
+contains
+
+  !> Supports, and the components that they leave free.
+  subroutine set_up_supports(input, model)
+    type(input_t), intent(in)    :: input
+    type(model_t), intent(inout) :: model
+    real(wp), allocatable :: mass(:)
+    integer :: k, n
+
+    n = size(model%points%volume)
+    allocate (mass(n), source=model%materials%density_of(n) * model%points%volume)
+    allocate (model%supports%items(size(input%boundaries)))
+    do k = 1, size(input%boundaries)
+      call new_support(input%boundaries, k, mass, model, model%supports%items(k)%support)
+    end do
+    call model%supports%mark_prescribed(model%points%free)
+  end subroutine set_up_supports
+
+  !> Support number k, of the kind that its boundary asks for.
+  subroutine new_support(given, k, mass, model, support)
+    type(boundary_input_t), intent(in) :: given(:)
+    integer,       intent(in) :: k
+    real(wp),      intent(in) :: mass(:)          !! rho V (n) [kg/m]
+    type(model_t), intent(in) :: model
+    class(support_t), allocatable, intent(out) :: support
+    type(point_set_t) :: set
+
+    associate (b => given(k), body => model%body)
+      set = boundary_set(b%name, body%boundary, k)
+      set%points = model%operators%storage%row(set%points)
+      if (b%contact == 'affine') then
+        allocate (support, source=new_affine_support(set, b%velocity_gradient, &
+          new_table(b%times, b%factors, 1.0_wp), model%points%position, mass))
+      else if (size(b%traction) > 0) then
+        allocate (support, source=new_loaded_platen(set, taken(b), b%traction, &
+          loaded_lengths(given, body%sides(side_number(b%side)), body%boundary), b%ramp_time))
+      else
+        allocate (support, source=new_rigid_support(set, taken(b), &
+          [new_table(b%times, b%velocities_x, b%velocity(1)), &
+           new_table(b%times, b%velocities_y, b%velocity(2))], mass))
+      end if
+    end associate
+  end subroutine new_support
+
+  !> The components in which a boundary takes forces from the body; in the others the body slides.
+  pure function taken(boundary)
+    type(boundary_input_t), intent(in) :: boundary
+    logical :: taken(2)
+
+    taken = .true.
+    if (boundary%contact == 'smooth') taken = [1, 2] == normal_axis(boundary%side)
+  end function taken
+
+  !> Length of a side that carries x and y of a traction [m]: of the body, and of the layers at its
+  !> ends where they slide along it and so stand for a body that goes on.
+  pure function loaded_lengths(given, side, owner) result(length)
+    type(boundary_input_t), intent(in) :: given(:)
+    type(side_t),           intent(in) :: side
+    integer,                intent(in) :: owner(:)   !! boundary of every point
+    real(wp) :: length(2), ends(2)
+    integer  :: c, last
+
+    last = size(side%points)
+    do c = 1, 2
+      ends = [side%lower, side%upper]
+      if (slides(owner(side%points(1)))) ends(1) = side%from(1)
+      if (slides(owner(side%points(last)))) ends(2) = side%to(last)
+      length(c) = sum(max(0.0_wp, min(side%to, ends(2)) - max(side%from, ends(1))))
+    end do
+
+  contains
+
+    !> Whether a boundary is a layer that slides along c.
+    pure logical function slides(b)
+      integer, intent(in) :: b
+      logical :: components(2)
+
+      slides = .false.
+      if (b <= 0) return
+      components = taken(given(b))
+      slides = .not. components(c)
+    end function slides
+
+  end function loaded_lengths
+
+  !> The two supports that approach each other, where there are such.
+  subroutine set_up_platens(input, model)
+    type(input_t), intent(in)    :: input
+    type(model_t), intent(inout) :: model
+
+    if (input%platens(1) == 0) return
+    associate (first => input%platens(1), second => input%platens(2))
+      model%platens = new_platens(normal_axis(input%boundaries(first)%side), input%platens, &
+        model%supports%items(first)%support, model%supports%items(second)%support, &
+        model%body%lower, model%body%upper)
+    end associate
+  end subroutine set_up_platens
+
+  !> Loads, in the order in which they are added to the forces.
+  !>
+  !> Errors: a pressure that acts on no point.
+  subroutine set_up_loads(input, model, errors)
+    type(input_t),      intent(in)    :: input
+    type(model_t),      intent(inout) :: model
+    type(error_list_t), intent(inout) :: errors
+    real(wp), allocatable :: vectors(:, :)
+    integer :: k
+
+    allocate (model%loads%items(size(input%pressures)))
+    if (size(input%pressures) == 0) return
+    allocate (vectors(model%operators%n, 2), source=0.0_wp)
+    call surface_vectors(model%operators, model%points%volume, vectors)
+    do k = 1, size(input%pressures)
+      call new_pressure_load(input%pressures(k), input%boundaries, vectors, model, &
+        model%loads%items(k)%load, errors)
+    end do
+  end subroutine set_up_loads
+
+  !> A pressure on a side of the body.
+  subroutine new_pressure_load(given, boundaries, vectors, model, load, errors)
+    type(pressure_input_t), intent(in)    :: given
+    type(boundary_input_t), intent(in)    :: boundaries(:)
+    real(wp),               intent(in)    :: vectors(:, :)   !! N in the rows of fields (n,2) [m]
+    type(model_t),          intent(in)    :: model
+    class(load_t), allocatable, intent(out) :: load
+    type(error_list_t),     intent(inout) :: errors
+    type(pressure_t) :: pressure
+
+    pressure = new_pressure(given%name, given%side, given%value, given%span, given%ramp_time)
+    call spread_pressure(surface_of(given%side, boundaries, vectors, model), pressure)
+    pressure%points = model%operators%storage%row(pressure%points)
+    if (size(pressure%points) == 0) &
+      call errors%add('a pressure acts on no point', '&pressure name = '//given%name)
+    allocate (load, source=pressure)
+  end subroutine new_pressure_load
+
+  !> A side of the body with the points below it and their weights.
+  type(surface_t) function surface_of(name, boundaries, vectors, model) result(surface)
+    character(*),           intent(in) :: name
+    type(boundary_input_t), intent(in) :: boundaries(:)
+    real(wp),               intent(in) :: vectors(:, :)   !! N in the rows of fields (n,2) [m]
+    type(model_t),          intent(in) :: model
+    logical :: components(2)
+    integer :: i
+
+    associate (body => model%body)
+      surface%side = body%sides(side_number(name))
+      surface%spacing = model%spacing
+      ! families that touch cut ones
+      surface%depth = 2 * ceiling(model%delta / model%spacing - 1.0e-6_wp)
+      call lines_below(surface%side, body%position, model%spacing, 2 * surface%depth + 2, &
+        surface%lines)
+      surface%weights = vectors(model%operators%storage%row, surface%side%axis)
+      surface%in_body = body%boundary == 0
+      allocate (surface%slides(body%n), source=.true.)
+      do i = 1, body%n
+        if (body%boundary(i) == 0) cycle
+        components = taken(boundaries(body%boundary(i)))
+        surface%slides(i) = .not. components(surface%side%axis)
+      end do
+    end associate
+  end function surface_of
+
+end module pd_setup_loads
