@@ -21,7 +21,7 @@ LAYERS = {
     "measure": {"numpy", "matplotlib.tri"},
     "draw": {"numpy", "matplotlib", "PIL"},
     "study": {"numpy", "matplotlib", "pydantic", "pydantic_core", "simpleeval", "tomli"},
-    "report": {"PIL", "pydantic", "tomli"},
+    "report": {"PIL", "jinja2", "markupsafe", "pydantic", "tomli"},
     "cli": {"numpy"},
     "__main__": set(),
     "__init__": set(),

@@ -6,6 +6,9 @@ import base64
 import io
 import json
 import re
+import subprocess
+import sys
+from fnmatch import fnmatch
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
@@ -23,6 +26,11 @@ from perigeo_post.report.publish import BEGIN, END, publish, tables
 from perigeo_post.report.values import HEADLINE, QUALITY, column_text, duration, number, prefixed
 from perigeo_post.report.write import gather, write_report
 from perigeo_post.study.measures import MEASURES
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
 
 Capture = pytest.CaptureFixture[str]
 SHA = "0123456789abcdef" * 4
@@ -639,6 +647,35 @@ def test_a_document_without_markers_is_left_alone(results: Path, tmp_path: Path,
     with pytest.raises(RequestError, match="studies: begin"):
         publish(gather(results), document)
     assert document.read_text() == text
+
+
+def test_without_jinja2_the_command_says_what_to_install(results: Path) -> None:
+    code = (
+        "import sys; sys.modules['jinja2'] = None\n"  # makes every import of it fail
+        "from perigeo_post.cli.command_line import main\nsys.exit(main(sys.argv[1:]))"
+    )
+    command = [sys.executable, "-c", code, "report", "--results", str(results)]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 1
+    (line,) = done.stderr.splitlines()
+    assert line.startswith("perigeo-post: error: perigeo-post report needs jinja2, which is not ")
+    assert line.endswith("-m pip install './postproc[report]'")
+    assert not (results / "report.html").exists()
+
+
+def test_an_installed_package_holds_every_file() -> None:
+    """Templates and the style sheet; in a checkout they are found in any case."""
+    root = Path(__file__).parents[1]
+    package = root / "perigeo_post"
+    settings = tomllib.loads((root / "pyproject.toml").read_text(encoding="utf-8"))
+    patterns = settings["tool"]["setuptools"]["package-data"]["perigeo_post"]
+    files = {
+        path.relative_to(package).as_posix()
+        for path in package.rglob("*")
+        if path.is_file() and path.suffix not in (".py", ".pyc")
+    }
+    assert {f"report/templates/{name}" for name in ("page.html", "style.css")} <= files
+    assert not [f for f in files if not any(fnmatch(f, pattern) for pattern in patterns)]
 
 
 # ---- numbers -------------------------------------------------------------------------------------
