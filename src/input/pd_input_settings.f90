@@ -70,13 +70,14 @@ contains
     equals = index(text, '=')
     name = ''
     if (equals > 0) name = lower_case(trim(adjustl(text(:equals - 1))))
+    parts%value = ''
     if (equals > 0) parts%value = trim(adjustl(text(equals + 1:)))
     if (equals > 0 .and. is_group(name, list)) then
       if (parts%value == '') name = name//'.'
     end if
     first = index(name, '.')
     last = index(name, '.', back=.true.)
-    if (first < 2 .or. (last == len(name) .and. .not. is_group(name(:last - 1), list))) then
+    if (first < 2 .or. (last == len(name) .and. parts%value /= '')) then
       call errors%add('no key with a value', where=parts%place, &
                       allowed='group.key=value or group.name.key=value')
       return
