@@ -20,8 +20,8 @@ module pd_geometry
     integer,  allocatable :: boundary(:)        !! 0: body, k: fictitious point of boundary k (n)
     integer,  allocatable :: part(:)            !! number of the rectangle that a point lies in, or
                                                 !! that its layer continues (n)
-    integer,  allocatable :: place(:, :)        !! column and row on the lattice (n,2); not allocated:
-                                                !! no lattice
+    integer,  allocatable :: place(:, :)        !! column and row on the lattice (n,2); not
+                                                !! allocated: no lattice
     real(wp) :: lower(2) = 0.0_wp               !! corners of the extent of the body without
     real(wp) :: upper(2) = 0.0_wp               !! fictitious points, as used [m]
     type(side_t) :: sides(side_count)           !! by number (`pd_sides`); not for a cloud
