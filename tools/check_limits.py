@@ -32,8 +32,6 @@ EXCEPTIONS = {
     **dict.fromkeys(
         (
             "postproc/tests/test_report.py",
-            "src/input/pd_namelist.f90",
-            "src/material/pd_j2.f90",
             "tests/cases/test_study.py",
             "tests/verify/verify.py",
         ),

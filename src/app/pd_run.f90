@@ -1,6 +1,6 @@
 !> A run: everything that it consists of, and how it begins.
 module pd_run
-  use, intrinsic :: iso_fortran_env, only: int64
+  use, intrinsic :: iso_fortran_env, only: compiler_version, int64
   use omp_lib, only: omp_get_max_threads
   use pd_checkpoint, only: checkpoint_t
   use pd_clock, only: clock_t
@@ -14,6 +14,7 @@ module pd_run
   use pd_observe, only: column_t, moment_at, observation_t, observe
   use pd_record, only: load_checkpoint, observe_state, open_record, record_frame, record_line, &
     record_progress, record_row, record_t, results_in_the_way, same_points
+  use pd_run_description, only: provenance_t
   use pd_schedule, only: schedule_t
   use pd_setup, only: set_up_model
   use pd_setup_body, only: set_up_body
@@ -22,7 +23,7 @@ module pd_run
   use pd_step, only: step_work_t
   use pd_summary, only: summarise, summary_t
   use pd_timing, only: timing_t
-  use pd_version, only: code_version, git_hash
+  use pd_version, only: build_flags, code_version, git_hash
   implicit none
   private
 
@@ -142,8 +143,9 @@ contains
     call get_command(length=length)
     allocate (character(length) :: command)
     call get_command(command)
-    call open_record(run%input, command, omp_get_max_threads(), run%model, run%schedule, &
-      run%checkpoint, options%quiet, run%record, errors)
+    call open_record(run%input, provenance_t(code_version, git_hash, compiler_version(), &
+      build_flags, command, omp_get_max_threads()), run%model, run%schedule, run%checkpoint, &
+      options%quiet, run%record, errors)
     call outcome%end_if_any(errors, exit_file)
     if (outcome%done) return
     associate (record => run%record)

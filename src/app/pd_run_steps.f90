@@ -60,7 +60,8 @@ contains
     type(outcome_t), intent(inout) :: outcome
     type(error_list_t) :: errors
 
-    if (failed_row > 0) call fail('det F is not positive, or not a number', failed_row, run, outcome)
+    if (failed_row > 0) &
+      call fail('det F is not positive, or not a number', failed_row, run, outcome)
     if (outcome%done) return
     if (due%anything) then
       call run%ledger%note_work(run%model%blocks)

@@ -5,8 +5,8 @@ module pd_summary
   use pd_forces, only: linear_forces
   use pd_input_types, only: input_t, material_input_t, random_field_input_t
   use pd_kinds, only: is_set, wp
-  use pd_random_field, only: spread_of, spread_t
   use pd_model, only: model_t
+  use pd_random_field, only: spread_of, spread_t
   use pd_schedule, only: schedule_t
   use pd_state, only: state_t
   use pd_text, only: number => short_number, whole => integer_text

@@ -1,8 +1,8 @@
-!> Blocks of points, and everything that is taken over all points: sums, extrema, counts.
+!> Blocks of rows, and everything that is taken over all of them: sums, extrema, counts.
 !>
 !> Kernels work on one block of `n_block` rows of the fields after the other, whatever the number of
-!> threads. What a block hands back is one number; these are added in the order of the blocks, so
-!> that a sum has the same bits for any number of threads and ranks.
+!> threads. Each block returns one number; these are added in the order of the blocks, so that
+!> a sum has the same bits for any number of threads and ranks.
 module pd_blocks
   use pd_kinds, only: n_block, wp
   use pd_ranks, only: ranks_t
@@ -77,7 +77,7 @@ contains
     smallest = self%ranks%smallest(parts)
   end function smallest
 
-  !> Lowest number over 0 of any block, such as a row where something failed; 0: none.
+  !> Lowest positive number of any block, such as a row where something failed; 0: none.
   pure integer function lowest_number(self, parts) result(lowest)
     class(blocks_t), intent(in) :: self
     integer,         intent(in) :: parts(:)   !! one number per block

@@ -1,4 +1,4 @@
-!> Problems as values, exit statuses, and how a run comes out.
+!> Problems as values, exit statuses, and the outcome of a run.
 module pd_errors
   implicit none
   private
@@ -31,7 +31,7 @@ module pd_errors
     procedure :: print => print_messages
   end type error_list_t
 
-  !> Whether the program goes on, and if not, why and with which exit status it ends.
+  !> Whether the program goes on; if not, why, and with which exit status it ends.
   type :: outcome_t
     logical :: done = .false.
     integer :: status = exit_ok
@@ -98,7 +98,7 @@ contains
     end do
   end subroutine print_messages
 
-  !> End with a status where there are problems, unless the end has come already.
+  !> End with a status if there are problems, unless the run has ended already.
   subroutine end_if_any(self, errors, status)
     class(outcome_t),   intent(inout) :: self
     type(error_list_t), intent(in)    :: errors

@@ -1,8 +1,8 @@
 !> Visitors of fields over the points: a state names its fields once, in one procedure that shows
-!> them to a visitor, and whatever is done with all of them is a visitor.
+!> them to a visitor; everything that is done with all fields is a visitor.
 !>
-!> Here are the visitors that need nothing but arrays: room, a choice of points, points scattered
-!> over more places, a count. Those that read and write are in `pd_checkpoint`.
+!> The visitors here need nothing but arrays: they allocate, gather some rows, scatter them over
+!> more rows, and count. Those that read and write are in `pd_checkpoint`.
 module pd_fields
   use pd_kinds, only: wp
   use pd_labels, only: field_label_t, label_t
@@ -57,8 +57,8 @@ module pd_fields
     procedure :: several_numbers => allocate_2
   end type allocating_t
 
-  !> Of the fields that are kept, take the values at some places only, in their order; the others
-  !> are given up.
+  !> Of the fields that are kept, take the values of some rows only, in their order; deallocate the
+  !> others.
   type, extends(field_visitor_t) :: gathering_t
     integer, allocatable :: places(:)
   contains
@@ -66,7 +66,7 @@ module pd_fields
     procedure :: several_numbers => gather_2
   end type gathering_t
 
-  !> Put the values of the fields that are kept at some of n places; all other values are those of
+  !> Put the values of the fields that are kept into some of n rows; all other values are those of
   !> an unloaded point.
   type, extends(field_visitor_t) :: scattering_t
     integer, allocatable :: places(:)
@@ -76,7 +76,7 @@ module pd_fields
     procedure :: several_numbers => scatter_2
   end type scattering_t
 
-  !> Count the numbers per point, those that are there or those that will be.
+  !> Count the numbers per point, allocated or not.
   type, extends(field_visitor_t) :: counting_t
     integer :: numbers = 0
   contains

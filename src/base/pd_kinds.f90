@@ -11,11 +11,11 @@ module pd_kinds
 
   real(wp), parameter :: pi = acos(-1.0_wp)
 
-  !> A number that the user has not given. Not a NaN: that would trap in the checking build.
+  !> Stands for a number that the user has not given. Not a NaN: it would trap in the debug build.
   real(wp), parameter :: unset = -huge(1.0_wp)
 
-  !> Points are worked on in blocks of this many, whatever the number of threads: every sum is
-  !> taken over a block and then over the blocks in order, so the bits do not depend on threads.
+  !> Kernels work on blocks of this many rows, whatever the number of threads: every sum is taken
+  !> over a block and then over the blocks in order, so its bits do not depend on threads.
   integer, parameter :: n_block = 256
 
   !> Numbers in a line of the cache, 64 bytes. Arrays begin at one (`pd_memory`), and on a lattice

@@ -9,7 +9,7 @@ module pd_random
 
   public :: random_t, new_random
 
-  !> A stream of random numbers. All six words 12345 is the start that the source publishes.
+  !> A stream of random numbers. The published start has 12345 in all six words.
   type :: random_t
     integer(i8) :: first(3) = 12345_i8    !! 0 to modulus_1 - 1, not all 0; the newest last
     integer(i8) :: second(3) = 12345_i8   !! 0 to modulus_2 - 1, not all 0
@@ -22,8 +22,8 @@ module pd_random
 
 contains
 
-  !> The stream of a seed. Streams of neighbouring seeds have nothing in common: the words of the
-  !> state are the seed and the number of the word, scrambled.
+  !> The stream of a seed. Streams of neighbouring seeds have nothing in common: each word of the
+  !> state is scrambled from the seed and the number of the word.
   pure type(random_t) function new_random(seed) result(random)
     integer, intent(in) :: seed   !! >= 0
     integer(i8), parameter :: golden = 2654435769_i8   !! 2^32 over the golden ratio

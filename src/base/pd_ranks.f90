@@ -22,7 +22,7 @@ module pd_ranks
 
 contains
 
-  !> Sum of what the blocks of all ranks hold, in the order of the blocks of the whole body: the
+  !> Sum over the blocks of all ranks, in the order of the blocks of the whole body: the
   !> same bits for any number of ranks.
   pure real(wp) function total(parts)
     real(wp), intent(in) :: parts(:)   !! one number per block of this rank
@@ -30,21 +30,21 @@ contains
     total = sum(parts)
   end function total
 
-  !> Largest of what the blocks of all ranks hold; -huge where there are none.
+  !> Largest number of the blocks of all ranks; -huge if there are no blocks.
   pure real(wp) function largest(parts)
     real(wp), intent(in) :: parts(:)   !! one number per block of this rank
 
     largest = maxval(parts)
   end function largest
 
-  !> Smallest of what the blocks of all ranks hold; huge where there are none.
+  !> Smallest number of the blocks of all ranks; huge if there are no blocks.
   pure real(wp) function smallest(parts)
     real(wp), intent(in) :: parts(:)   !! one number per block of this rank
 
     smallest = minval(parts)
   end function smallest
 
-  !> Lowest number over 0 that any block of any rank holds; 0: none does.
+  !> Lowest positive number of the blocks of all ranks; 0: there is none.
   pure integer function lowest_number(parts) result(lowest)
     integer, intent(in) :: parts(:)   !! one number per block of this rank
 

@@ -54,7 +54,7 @@ contains
     end if
   end function new_ramp
 
-  !> The rate of a less that of b, at the times of both. Constants bring no time of their own.
+  !> The rate of a minus that of b, at the times of both. Constants add no times.
   pure type(table_t) function difference(a, b) result(table)
     type(table_t), intent(in) :: a, b
     real(wp) :: times(size(a%times) + size(b%times)), time

@@ -1,4 +1,4 @@
-!> Words and numbers as text: what reading an input file and naming its mistakes need.
+!> Words and numbers as text, for reading an input file and naming its mistakes.
 module pd_text
   use, intrinsic :: iso_fortran_env, only: int64
   use pd_kinds, only: is_set, wp
@@ -14,7 +14,7 @@ module pd_text
 
 contains
 
-  !> The text with the 26 capital letters made small; every other byte stays.
+  !> The text with A-Z in lower case; every other byte stays.
   pure function lower_case(text) result(small)
     character(*), intent(in) :: text
     character(len(text)) :: small
@@ -190,8 +190,8 @@ contains
     text = trim(adjustl(buffer))
   end function short_number
 
-  !> Read a real number: [+-]digits[.digits][e|d[+-]digits]. What is wrong with it in `problem`,
-  !> empty where nothing is.
+  !> Read a real number: [+-]digits[.digits][e|d[+-]digits]. `problem` says what is wrong with it,
+  !> and is empty if nothing is.
   !>
   !> Magnitudes outside 1e-100 ... 1e100 are refused here, before the run-time library sees them:
   !> it would raise a floating-point exception, and so would products of a few such numbers.
@@ -266,7 +266,7 @@ contains
     is_exponent = len(text) >= first .and. verify(text(first:), digits) == 0
   end function is_exponent
 
-  !> Read a whole number of at most nine digits; what is wrong with it in `problem`.
+  !> Read a whole number of at most nine digits; `problem` says what is wrong with it.
   pure subroutine read_integer(text, i, problem)
     character(*),              intent(in)  :: text
     integer,                   intent(out) :: i

@@ -1,7 +1,7 @@
 !> Where the time of a step goes.
 !>
-!> Kernels that follow one another on each block of points run in one loop. Every now and then the
-!> blocks are timed, and the time of the loop is given to its kernels in those proportions.
+!> Kernels that follow one another on each block of rows run in one loop. In some steps the blocks
+!> are timed, and the time of the loop is divided among its kernels in proportion.
 module pd_timing
   use, intrinsic :: iso_fortran_env, only: int64
   use pd_kinds, only: wp
@@ -17,7 +17,7 @@ module pd_timing
   !> Their numbers; gradient and stress run block by block in one loop, see `lap_blocks`.
   integer, parameter :: kernel_motion = 1, kernel_gradient = 2, kernel_force = 4, &
     kernel_boundaries = 5, kernel_history = 6
-  integer, parameter :: timed_step = 20   !! every so many steps the blocks are timed
+  integer, parameter :: timed_step = 20   !! the blocks are timed once in so many steps
 
   !> Wall clock time spent in each kernel [s].
   type :: timing_t
@@ -51,7 +51,7 @@ contains
     self%last = now()
   end subroutine begin
 
-  !> Give the time since the last call to a kernel.
+  !> Add the time since the last call to that of a kernel.
   subroutine lap(self, kernel)
     class(timing_t), intent(inout) :: self
     integer,         intent(in)    :: kernel
@@ -62,8 +62,8 @@ contains
     self%last = time
   end subroutine lap
 
-  !> Give the time since the last call to a kernel and the one after it, which ran block by block:
-  !> `times` holds the clock before, between and behind them where blocks are timed.
+  !> Divide the time since the last call between a kernel and the one after it, which ran block by
+  !> block. If blocks are timed, `times` holds the clock before, between and after the two.
   subroutine lap_blocks(self, kernel, times)
     class(timing_t), intent(inout) :: self
     integer,         intent(in)    :: kernel        !! the first of the two

@@ -1,5 +1,5 @@
 !> A point cloud from a text file: x, y [m], volume [m^2], and optionally the name of the boundary
-!> that the point belongs to, one point a line; `#` starts a comment.
+!> that the point belongs to, one point per line; `#` starts a comment.
 !>
 !> Source: doc/input.md, point clouds.
 module pd_cloud
@@ -104,7 +104,7 @@ contains
 
     write (where, '(a,i0)') ', line ', n_lines
     words = ''
-    ! a right line ends before its fifth word: status < 0
+    ! a correct line ends before its fifth word: status < 0
     read (line, *, iostat=status) words
     n_words = count(words /= '')
     values = 0.0_wp

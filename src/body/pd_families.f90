@@ -2,6 +2,7 @@
 !>
 !> Source: doc/theory.md, section 1.
 module pd_families
+  use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   use pd_cells, only: cells_t, neighbourhood
   use pd_kinds, only: wp
   implicit none
@@ -9,12 +10,12 @@ module pd_families
 
   public :: horizon_t, new_horizon, within_horizon, influence, family
 
-  integer, parameter :: gaussian = 1, constant = 2, conical = 3
+  integer, parameter :: unknown = 0, gaussian = 1, constant = 2, conical = 3
 
   !> Radius and influence function.
   type :: horizon_t
     real(wp) :: delta                    !! [m]
-    integer, private :: shape
+    integer, private :: shape = unknown
   end type horizon_t
 
 contains
@@ -26,12 +27,14 @@ contains
 
     horizon%delta = delta
     select case (influence_function)
+    case ('gaussian')
+      horizon%shape = gaussian
     case ('constant')
       horizon%shape = constant
     case ('conical')
       horizon%shape = conical
     case default
-      horizon%shape = gaussian
+      horizon%shape = unknown
     end select
   end function new_horizon
 
@@ -45,18 +48,20 @@ contains
     within_horizon = length_squared <= (horizon%delta * (1.0_wp + tolerance))**2
   end function within_horizon
 
-  !> Influence function omega(|xi|).
+  !> Influence function omega(|xi|); not a number where the horizon has none.
   elemental real(wp) function influence(horizon, length_squared) result(omega)
     type(horizon_t), intent(in) :: horizon
     real(wp),        intent(in) :: length_squared   !! |xi|^2 [m^2]
 
     select case (horizon%shape)
+    case (gaussian)
+      omega = exp(-length_squared / horizon%delta**2)
     case (constant)
       omega = 1.0_wp
     case (conical)
       omega = max(0.0_wp, 1.0_wp - sqrt(length_squared) / horizon%delta)
     case default
-      omega = exp(-length_squared / horizon%delta**2)
+      omega = ieee_value(1.0_wp, ieee_quiet_nan)
     end select
   end function influence
 

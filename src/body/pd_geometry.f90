@@ -20,8 +20,8 @@ module pd_geometry
     integer,  allocatable :: boundary(:)        !! 0: body, k: fictitious point of boundary k (n)
     integer,  allocatable :: part(:)            !! number of the rectangle that a point lies in, or
                                                 !! that its layer continues (n)
-    integer,  allocatable :: place(:, :)        !! column and row on the lattice (n,2); not allocated:
-                                                !! no lattice
+    integer,  allocatable :: place(:, :)        !! column and row on the lattice (n,2); not
+                                                !! allocated: no lattice
     real(wp) :: lower(2) = 0.0_wp               !! corners of the extent of the body without
     real(wp) :: upper(2) = 0.0_wp               !! fictitious points, as used [m]
     type(side_t) :: sides(side_count)           !! by number (`pd_sides`); not for a cloud
@@ -31,7 +31,7 @@ module pd_geometry
   type :: lattice_t
     real(wp) :: spacing                         !! dx [m]
     logical  :: cells                           !! points at cell centres, else on the boundary
-    logical  :: tributary                       !! each point owns its own part of the area
+    logical  :: tributary                       !! each point has its own part of the area
     integer  :: rows                            !! thickness of fictitious layers in points
   end type lattice_t
 
@@ -46,7 +46,7 @@ module pd_geometry
   type :: places_t
     integer, allocatable :: owner(:, :)         !! `empty`, or as body_t%boundary
     integer, allocatable :: part(:, :)          !! number of the rectangle; 0: none
-    logical, allocatable :: filled(:, :)        !! the square up and right of a node is material
+    logical, allocatable :: filled(:, :)        !! the square above and right of a node is material
     integer, allocatable :: number(:, :)        !! of the point at a place, 0: none
   end type places_t
 
@@ -129,8 +129,8 @@ contains
   !> Mark the fictitious points beyond a side: under (above, beside) every point of the outermost
   !> row. Where layers of two sides meet, the corner block belongs to the bottom or top side.
   !>
-  !> The squares go one row further than the points: the outermost row stands for a body that
-  !> goes on, so that its points own whole cells across the layer.
+  !> The squares extend one row beyond the points: the outermost row stands for a body that goes
+  !> on, so that its points have whole cells across the layer.
   subroutine fill_layer(layer, layers, counts, lattice, places)
     type(layer_t),   intent(in)    :: layer
     type(layer_t),   intent(in)    :: layers(:)
@@ -288,7 +288,7 @@ contains
     end do
   end subroutine find_sides
 
-  !> The points of one line of places, and what each owns of the squares along it.
+  !> The points of one line of places, and the part of the squares along it that each has.
   pure subroutine find_side(first, number, filled, origin, lattice, side)
     integer,         intent(in)  :: first             !! index of the first place
     integer,         intent(in)  :: number(first:)

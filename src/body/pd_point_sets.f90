@@ -1,7 +1,7 @@
 !> Sets of points: what boundaries hold and what loads act on.
 !>
-!> A set is a name and the numbers of its points. How it came about (a layer of a lattice, a name
-!> in a cloud, a side) is settled here, before supports and loads see it.
+!> A set is a name and the numbers of its points. Where it comes from (a layer of a lattice, a name
+!> in a cloud, a side) no longer matters to supports and loads.
 !> Source: doc/theory.md, section 7.
 module pd_point_sets
   use pd_kinds, only: wp
@@ -16,7 +16,7 @@ module pd_point_sets
   end type point_set_t
 
   !> The points of a lattice on the outermost line of its body at one side, layers that continue it
-  !> included, and the part of the side that each owns: half a spacing to either side with the
+  !> included, and the part of the side that each has: half a spacing to either side with the
   !> layout nodes, less at an end, the width of its cell with the layout cells.
   type, extends(point_set_t) :: side_t
     integer  :: axis = 0                        !! of the normal; 1: x, 2: y

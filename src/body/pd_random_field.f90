@@ -24,9 +24,9 @@ module pd_random_field
     real(wp) :: phase(n_waves)     !! over 2 pi, 0 to 1
   end type random_field_t
 
-  !> What a field has come to over a body.
+  !> The statistics of a field over a body.
   type :: spread_t
-    real(wp) :: mean, variation    !! the second one: standard deviation over mean
+    real(wp) :: mean, variation    !! variation: standard deviation over mean
     real(wp) :: smallest, largest
   end type spread_t
 

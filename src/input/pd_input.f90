@@ -11,8 +11,10 @@ module pd_input
   use pd_load_checks, only: check_loads
   use pd_material_checks, only: check_materials
   use pd_motion_checks, only: check_motion
-  use pd_namelist, only: namelist_group_t, read_text_file, scan_namelist
+  use pd_namelist, only: scan_namelist
+  use pd_namelist_groups, only: namelist_group_t
   use pd_platen_checks, only: platens_of
+  use pd_text_file, only: read_text_file
   use pd_used_values, only: compare_used, used_values
   implicit none
   private

@@ -7,7 +7,8 @@ module pd_input_checks
   use pd_input_types, only: body_input_t, input_t
   use pd_input_values, only: group_named, is_damaged, is_given
   use pd_kinds, only: is_set, wp
-  use pd_namelist, only: max_problems, namelist_group_t, place_of
+  use pd_namelist, only: max_problems
+  use pd_namelist_groups, only: namelist_group_t, place_of
   use pd_text, only: integer_text, number_text
   implicit none
   private

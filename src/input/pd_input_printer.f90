@@ -7,7 +7,7 @@ module pd_input_printer
   use pd_input_values, only: group_named, is_given, problem_of_range
   use pd_keys, only: group_key_t, key_t, key_visitor_t
   use pd_kinds, only: is_set, wp
-  use pd_namelist, only: namelist_group_t
+  use pd_namelist_groups, only: namelist_group_t
   use pd_text, only: integer_text, number_text
   use pd_used_values, only: numbers_text
   implicit none

@@ -9,7 +9,8 @@ module pd_input_settings
   use pd_input_values, only: count_groups, did_you_mean
   use pd_key_list, only: key_list_t
   use pd_keys, only: allowed_values, find_group, find_key, kind_text
-  use pd_namelist, only: namelist_entry_t, namelist_group_t, scan_namelist
+  use pd_namelist, only: scan_namelist
+  use pd_namelist_groups, only: namelist_entry_t, namelist_group_t
   use pd_text, only: integer_text, is_name, lower_case, quoted_list, read_integer, shortened
   implicit none
   private

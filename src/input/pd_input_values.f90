@@ -8,7 +8,8 @@ module pd_input_values
   use pd_keys, only: allowed_values, find_group, find_key, group_key_t, key_t, keys_of, &
     kind_integer, kind_text, words_of
   use pd_kinds, only: is_set, wp
-  use pd_namelist, only: max_problems, namelist_group_t, namelist_value_t, place_of
+  use pd_namelist, only: max_problems
+  use pd_namelist_groups, only: namelist_group_t, namelist_value_t, place_of
   use pd_text, only: integer_text, is_name, nearest_name, quoted_list, read_integer, &
     read_number, shortened
   implicit none

@@ -6,7 +6,7 @@ module pd_key_reader
   use pd_input_values, only: group_named
   use pd_keys, only: group_key_t, key_t, key_visitor_t
   use pd_kinds, only: unset, wp
-  use pd_namelist, only: namelist_group_t
+  use pd_namelist_groups, only: namelist_group_t
   use pd_text, only: read_integer, read_number
   implicit none
   private

@@ -9,7 +9,8 @@ module pd_load_checks
   use pd_input_values, only: group_named, is_given
   use pd_kinds, only: is_set, wp
   use pd_motion_checks, only: check_increasing
-  use pd_namelist, only: max_problems, namelist_group_t, place_of
+  use pd_namelist, only: max_problems
+  use pd_namelist_groups, only: namelist_group_t, place_of
   use pd_platen_checks, only: platen_under_load
   use pd_sides, only: normal_axis
   use pd_text, only: integer_text, number_text

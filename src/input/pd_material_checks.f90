@@ -8,7 +8,8 @@ module pd_material_checks
   use pd_input_types, only: input_t, material_input_t
   use pd_input_values, only: count_groups, did_you_mean, group_named, is_given
   use pd_kinds, only: is_set, wp
-  use pd_namelist, only: max_problems, namelist_group_t, place_of
+  use pd_namelist, only: max_problems
+  use pd_namelist_groups, only: namelist_group_t, place_of
   use pd_text, only: number_text, quoted_list
   implicit none
   private

@@ -8,7 +8,8 @@ module pd_motion_checks
   use pd_input_types, only: boundary_input_t, input_t
   use pd_input_values, only: group_named, is_damaged, is_given
   use pd_kinds, only: is_set, unset, wp
-  use pd_namelist, only: max_problems, namelist_group_t, place_of
+  use pd_namelist, only: max_problems
+  use pd_namelist_groups, only: namelist_group_t, place_of
   use pd_platen_checks, only: platen_approach, platen_extent, platen_under_load
   use pd_sides, only: normal_axis
   use pd_tables, only: table_t

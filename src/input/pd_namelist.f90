@@ -11,45 +11,20 @@
 module pd_namelist
   use pd_cursor, only: blanks, cursor_t, line_ends, quotes
   use pd_errors, only: error_list_t
+  use pd_namelist_groups, only: lengthen, namelist_entry_t, namelist_group_t, namelist_value_t
   use pd_text, only: integer_text, is_name, lower_case, read_integer, shortened
   implicit none
   private
 
-  public :: namelist_value_t, namelist_entry_t, namelist_group_t
-  public :: read_text_file, scan_namelist, place_of, max_problems
+  public :: scan_namelist, max_problems
 
   !> No more problems than this are listed: a file that is no namelist at all has thousands.
   integer, parameter :: max_problems = 200
 
-  integer, parameter :: max_bytes = 1048576   !! of a file
   integer, parameter :: max_values = 10000    !! of one key
   integer, parameter :: max_keys = 1000       !! of one group
   integer, parameter :: max_groups = 1000
   integer, parameter :: max_total = 200000    !! values of a file
-
-  !> One value as written; of a text what stands between the quotes.
-  type :: namelist_value_t
-    character(:), allocatable :: text
-    logical :: quoted = .false.
-  end type namelist_value_t
-
-  !> key = values. `damaged`: has been complained about, the values are not to be used.
-  type :: namelist_entry_t
-    character(:), allocatable :: key                   !! in small letters
-    character(:), allocatable :: source                !! where it stands, if not in the file
-    integer :: line = 0
-    character(:), allocatable :: place                 !! where it stands, if not in the file
-    logical :: damaged = .false.
-    type(namelist_value_t), allocatable :: values(:)
-  end type namelist_entry_t
-
-  type :: namelist_group_t
-    character(:), allocatable :: file, name            !! name: in small letters
-    integer :: line = 0                                !! of the &; 0: the file has no such group
-    type(namelist_entry_t), allocatable :: entries(:)
-  contains
-    procedure :: find
-  end type namelist_group_t
 
   !> The text with a place in it, and what has been found so far.
   type, extends(cursor_t) :: scanner_t
@@ -59,40 +34,6 @@ module pd_namelist
   end type scanner_t
 
 contains
-
-  !> Read a whole file byte for byte; an error where it cannot be read or is too large.
-  subroutine read_text_file(path, text, errors)
-    character(*),              intent(in)    :: path
-    character(:), allocatable, intent(out)   :: text
-    type(error_list_t),        intent(inout) :: errors
-    character(:), allocatable :: buffer
-    character(256) :: reason
-    integer :: n, status, unit
-
-    text = ''
-    reason = ''
-    open (newunit=unit, file=path, access='stream', form='unformatted', action='read', &
-          status='old', iostat=status, iomsg=reason)
-    if (status /= 0) then
-      call errors%add('the input file cannot be read', where=path, found=reason)
-      return
-    end if
-    allocate (character(max_bytes + 1) :: buffer)
-    n = 0
-    do while (n <= max_bytes)
-      read (unit, iostat=status, iomsg=reason) buffer(n + 1:n + 1)
-      if (status /= 0) exit
-      n = n + 1
-    end do
-    close (unit)
-    if (n > max_bytes) then
-      call errors%add('the input file is too large', where=path, allowed='at most 1 MiB')
-    else if (.not. is_iostat_end(status)) then
-      call errors%add('the input file cannot be read', where=path, found=reason)
-    else
-      text = buffer(:n)
-    end if
-  end subroutine read_text_file
 
   !> Split the text of a namelist file into groups, in their order.
   !>
@@ -132,46 +73,6 @@ contains
     end do
     if (present(complete)) complete = .not. scanner%stopped
   end subroutine scan_namelist
-
-  !> Index of a key among the entries of a group, 0 where it is not there; the first of several.
-  pure integer function find(self, key) result(i)
-    class(namelist_group_t), intent(in) :: self
-    character(*),            intent(in) :: key
-
-    do i = 1, size(self%entries)
-      if (self%entries(i)%key == key) return
-    end do
-    i = 0
-  end function find
-
-  !> Where a key stands, for messages: file, line, group and key. Without the key: the group.
-  pure function place_of(group, key) result(place)
-    type(namelist_group_t), intent(in) :: group
-    character(*), intent(in), optional :: key
-    character(:), allocatable :: place
-    integer :: i, line
-
-    line = group%line
-    if (present(key)) then
-      i = group%find(key)
-      if (i > 0) then
-        if (allocated(group%entries(i)%place)) then
-          place = group%entries(i)%place
-          return
-        end if
-        line = group%entries(i)%line
-      end if
-    end if
-    place = group%file
-    if (present(key)) then
-      if (i > 0) then
-        if (allocated(group%entries(i)%source)) place = group%entries(i)%source
-      end if
-    end if
-    if (line > 0) place = place//', line '//integer_text(line)
-    place = place//', &'//shortened(group%name)
-    if (present(key)) place = place//' '//shortened(key)
-  end function place_of
 
   !> Control characters; a byte of zero means that this is no text, and ends the scan.
   !> The mark that some editors put before UTF-8 is passed over.
@@ -254,7 +155,7 @@ contains
         call complain(scanner, errors, 'more than 1000 keys in one group', scanner%line)
         scanner%stopped = .true.
       else
-        if (n == size(list)) call lengthen_entries(list)
+        if (n == size(list)) call lengthen(list)
         call scan_entry(scanner, group%name, list, n, errors)
       end if
     end do
@@ -444,7 +345,7 @@ contains
     end if
     scanner%n_values = scanner%n_values + repeats
     do i = 1, repeats
-      if (n == size(list)) call lengthen_values(list)
+      if (n == size(list)) call lengthen(list)
       n = n + 1
       list(n) = value
     end do
@@ -516,41 +417,5 @@ contains
     call errors%add(what, where=scanner%file//', line '//integer_text(line), found=found, &
                     allowed=allowed)
   end subroutine complain
-
-  subroutine lengthen(list)
-    type(namelist_group_t), allocatable, intent(inout) :: list(:)
-    type(namelist_group_t), allocatable :: longer(:)
-    integer :: i
-
-    allocate (longer(2*size(list)))
-    do i = 1, size(list)
-      longer(i) = list(i)
-    end do
-    call move_alloc(longer, list)
-  end subroutine lengthen
-
-  subroutine lengthen_entries(list)
-    type(namelist_entry_t), allocatable, intent(inout) :: list(:)
-    type(namelist_entry_t), allocatable :: longer(:)
-    integer :: i
-
-    allocate (longer(2*size(list)))
-    do i = 1, size(list)
-      longer(i) = list(i)
-    end do
-    call move_alloc(longer, list)
-  end subroutine lengthen_entries
-
-  subroutine lengthen_values(list)
-    type(namelist_value_t), allocatable, intent(inout) :: list(:)
-    type(namelist_value_t), allocatable :: longer(:)
-    integer :: i
-
-    allocate (longer(2*size(list)))
-    do i = 1, size(list)
-      longer(i) = list(i)
-    end do
-    call move_alloc(longer, list)
-  end subroutine lengthen_values
 
 end module pd_namelist

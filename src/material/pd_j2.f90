@@ -6,9 +6,9 @@
 module pd_j2
   use pd_elastic, only: elastic_t, new_elastic
   use pd_kinds, only: n_block, wp
-  use pd_labels, only: label_t
   use pd_law, only: flow_t, law_points_t, law_t
   use pd_tensors, only: inner, norm
+  use pd_yielding, only: alpha, gather_points, remembers, scatter_points, yielding_t
   implicit none
   private
 
@@ -25,20 +25,8 @@ module pd_j2
     procedure :: reduced
   end type j2_t
 
-  !> Columns of the history: E^p, beta (xx yy zz xy each) and alpha.
-  integer, parameter :: plastic_strain = 0, back_stress = 4, alpha = 9
-
-  !> Points that yield, gathered from a block: the loops over them run with unit stride.
-  type :: yielding_t
-    real(wp) :: yield_stress(n_block)         !! sigma_y0 [Pa]
-    real(wp) :: stress(n_block, 4)            !! S* -> S [Pa]
-    real(wp) :: plastic_strain(n_block, 4)    !! E^p
-    real(wp) :: back_stress(n_block, 4)       !! beta [Pa]
-    real(wp) :: alpha(n_block)                !! equivalent plastic strain
-  end type yielding_t
-
   real(wp), parameter :: tiny_modulus = 1.0e-30_wp   !! keeps quotients finite that are not used
-  real(wp), parameter :: far = 1.0e100_wp            !! a plastic increment that never comes
+  real(wp), parameter :: far = 1.0e100_wp            !! a plastic increment that no point reaches
   real(wp), parameter :: root_3_2 = sqrt(1.5_wp), root_2_3 = sqrt(2.0_wp / 3.0_wp)
 
 contains
@@ -56,23 +44,6 @@ contains
     law%isotropic_modulus = isotropic_modulus
     law%residual_strength = residual_strength
   end function new_j2
-
-  !> What a point remembers.
-  pure function remembers() result(columns)
-    type(label_t), allocatable :: columns(:)
-    character(2), parameter :: ends(4) = ['xx', 'yy', 'zz', 'xy']
-    integer :: c
-
-    allocate (columns(alpha))
-    do c = 1, 4
-      columns(plastic_strain + c) = label_t('plastic_strain_'//ends(c), '1', &
-        'plastic strain '//ends(c))
-      columns(back_stress + c) = label_t('back_stress_'//ends(c), 'Pa', &
-        'back stress '//ends(c))
-    end do
-    columns(alpha) = label_t('equivalent_plastic_strain', '1', &
-      'equivalent plastic strain, accumulated')
-  end function remembers
 
   !> The same law with its residual strength divided by a factor.
   pure function reduced(self, factor) result(law)
@@ -97,7 +68,7 @@ contains
   !> Errors: none: every trial state has exactly one answer (3 G + H_k + H_i > 0, and with two
   !> negative moduli 3 G + H_i + min(H_k, H_i) > 0).
   pure subroutine return_to_surface(material, n, points)
-    class(j2_t),       intent(in)    :: material
+    class(j2_t),      intent(in)    :: material
     integer,          intent(in)    :: n
     type(yielding_t), intent(inout) :: points
     real(wp) :: flow(n_block, 4)   !! direction of the flow, of length 1
@@ -170,7 +141,7 @@ contains
   !> (h^2 - k^2) da^2 - 2 (h b . n - r k) da - (r^2 - b . b) = 0, in the form that does not cancel.
   !> Written without a branch: every quotient is finite, also where it is not used.
   pure subroutine increments(material, n, points, q, flow, first, da)
-    class(j2_t),       intent(in)  :: material
+    class(j2_t),      intent(in)  :: material
     integer,          intent(in)  :: n
     type(yielding_t), intent(in)  :: points
     real(wp),         intent(in)  :: q(n_block), flow(n_block, 4)
@@ -226,7 +197,7 @@ contains
 
   !> beta <- beta + sqrt(2/3) H_k da n: `first` where kinematic softening ends, else all of da.
   pure subroutine move_back_stress(material, n, flow, first, da, points)
-    class(j2_t),       intent(in)    :: material
+    class(j2_t),      intent(in)    :: material
     integer,          intent(in)    :: n
     real(wp),         intent(in)    :: flow(n_block, 4), first(n_block), da(n_block)
     type(yielding_t), intent(inout) :: points
@@ -247,7 +218,7 @@ contains
 
   !> alpha <- alpha + da, S on the yield surface, E^p by the stress that was taken back.
   pure subroutine update_points(material, n, flow, deviator_trial, da, points)
-    class(j2_t),       intent(in)    :: material
+    class(j2_t),      intent(in)    :: material
     integer,          intent(in)    :: n
     real(wp),         intent(in)    :: flow(n_block, 4), deviator_trial(n_block, 4), da(n_block)
     type(yielding_t), intent(inout) :: points
@@ -307,58 +278,6 @@ contains
     points%stress(lo:hi, :) = trial(lo - first + 1:hi - first + 1, :)
   end subroutine stress_block
 
-  !> The yielding points, one behind the other.
-  pure subroutine gather_points(n, first, rows, trial, points, yielding)
-    integer,            intent(in)  :: n, first, rows(n_block)
-    real(wp),           intent(in)  :: trial(n_block, 4)
-    type(law_points_t), intent(in)  :: points
-    type(yielding_t),   intent(out) :: yielding
-    integer :: k, c
-
-    associate (history => points%history)
-      do k = 1, n
-        yielding%yield_stress(k) = points%strength(rows(k))
-        yielding%alpha(k) = history(rows(k), alpha)
-      end do
-      do c = 1, 4
-        do k = 1, n
-          yielding%stress(k, c) = trial(rows(k) - first + 1, c)
-          yielding%plastic_strain(k, c) = history(rows(k), plastic_strain + c)
-          yielding%back_stress(k, c) = history(rows(k), back_stress + c)
-        end do
-      end do
-    end associate
-  end subroutine gather_points
-
-  !> Put the returned points back, and tell what they dissipated.
-  pure subroutine scatter_points(n, first, rows, yielding, trial, points, dissipated)
-    integer,            intent(in)    :: n, first, rows(n_block)
-    type(yielding_t),   intent(in)    :: yielding
-    real(wp),           intent(inout) :: trial(n_block, 4)
-    type(law_points_t), intent(inout) :: points
-    real(wp),           intent(inout) :: dissipated(n_block)   !! out: (n) [J/m^3]
-    real(wp), parameter :: twice(4) = [1.0_wp, 1.0_wp, 1.0_wp, 2.0_wp]
-    integer :: i, k, c
-
-    dissipated(:n) = 0.0_wp
-    associate (history => points%history)
-      do c = 1, 4
-        do k = 1, n
-          i = rows(k)
-          dissipated(k) = dissipated(k) + 0.5_wp * twice(c) &
-            * (points%stress(i, c) + yielding%stress(k, c)) &
-            * (yielding%plastic_strain(k, c) - history(i, plastic_strain + c))
-          trial(i - first + 1, c) = yielding%stress(k, c)
-          history(i, plastic_strain + c) = yielding%plastic_strain(k, c)
-          history(i, back_stress + c) = yielding%back_stress(k, c)
-        end do
-      end do
-      do k = 1, n
-        history(rows(k), alpha) = yielding%alpha(k)
-      end do
-    end associate
-  end subroutine scatter_points
-
   !> Trial stress of rows lo to hi, and by how much 3/2 |eta*|^2 exceeds sigma_y^2.
   pure subroutine trial_block(law, rows, strain, history, yield_stress, trial, excess, largest)
     class(j2_t), intent(in) :: law
@@ -367,8 +286,8 @@ contains
     real(wp),   intent(out) :: trial(n_block, 4)   !! S* xx yy zz xy [Pa]; row 1: row `first`
     real(wp),   intent(out) :: excess(n_block)     !! [Pa^2]
     real(wp),   intent(out) :: largest             !! excess of any row
-    real(wp) :: g2, lambda, hi_modulus, floor_strength, volumetric, exx, eyy, ezz, exy, mean, strength
-    real(wp) :: etaxx, etayy, etazz, etaxy
+    real(wp) :: g2, lambda, hi_modulus, floor_strength, volumetric, mean, strength
+    real(wp) :: exx, eyy, ezz, exy, etaxx, etayy, etazz, etaxy
     integer  :: i, b
 
     g2 = 2.0_wp * law%shear_modulus
@@ -406,7 +325,7 @@ contains
   !> point that is weaker than that from the start does not soften.
   pure real(wp) function strength_now(material, yield_stress, alpha) result(strength)
     class(j2_t), intent(in) :: material
-    real(wp),   intent(in) :: yield_stress, alpha
+    real(wp),    intent(in) :: yield_stress, alpha
 
     strength = yield_stress + material%isotropic_modulus * alpha
     if (material%isotropic_modulus < 0.0_wp) &

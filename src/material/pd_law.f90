@@ -1,8 +1,8 @@
 !> A material law: what the points of a material remember, and their stress.
 !>
-!> A law is a type that extends `law_t`, in a module of its own; set-up chooses it by one line. A
-!> law works on rows lo to hi of the fields of all points, which belong to its material. Strain is an
-!> array of a block, whose row 1 is row `first` of the fields.
+!> A law is a type that extends `law_t`, in a module of its own; set-up chooses it in one line. A
+!> law works on rows lo to hi of the fields of all points; these rows have its material. Strain is
+!> an array of one block; its row 1 belongs to row `first` of the fields.
 !> Source: doc/theory.md, section 3.
 module pd_law
   use pd_kinds, only: n_block, wp

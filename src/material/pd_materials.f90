@@ -35,7 +35,7 @@ module pd_materials
   type :: materials_t
     type(material_t), allocatable :: list(:)
     type(run_t),      allocatable :: runs(:)
-    integer,          allocatable :: first_run(:)   !! of each block, and one past the last (blocks+1)
+    integer,          allocatable :: first_run(:)   !! of each block, one past the last (blocks+1)
   contains
     procedure :: remembered
     procedure :: stress_block

@@ -19,8 +19,8 @@ module pd_forces
 
 contains
 
-  !> Forces at time t: internal ones, loads, and the reactions of the supports. Stress and history of
-  !> the state go from step n to n+1.
+  !> Forces at time t: internal ones, loads, and the reactions of the supports. Stress and history
+  !> of the state go from step n to n+1.
   !>
   !> `work`: what each block has dissipated in this step.
   !> `failed_row`: 0, or the first row whose det F is not positive (NaN included).

@@ -274,14 +274,13 @@ contains
 
     k = 1
     do part = 1, size(sums%parts)
-      select case (sums%parts(part))
-      case (2)
+      if (sums%parts(part) == 2) then
         call add_two(n, sums%plus(k:), sums%minus(k:), sums%weight(k:), sums%left, strands, total)
-      case (3)
+      else if (sums%parts(part) == 3) then
         call add_three(n, sums%plus(k:), sums%minus(k:), sums%weight(k:), sums%left, strands, total)
-      case default
+      else if (sums%parts(part) == 4) then
         call add_four(n, sums%plus(k:), sums%minus(k:), sums%weight(k:), sums%left, strands, total)
-      end select
+      end if
       k = k + sums%parts(part)
     end do
   end subroutine add_columns

@@ -282,7 +282,8 @@ contains
     do block = 1, self%domain%blocks%count
       lo = self%domain%blocks%lo(block)
       hi = self%domain%blocks%hi(block)
-      self%stiffness(lo:hi) = c(lo:hi) * (self%weight_sum(lo:hi) + self%own_weight * self%share_of(lo:hi))
+      self%stiffness(lo:hi) = c(lo:hi) &
+        * (self%weight_sum(lo:hi) + self%own_weight * self%share_of(lo:hi))
       call add_sums(self%columns, self%columns%l, lo, hi, shared, self%stiffness(lo:hi))
     end do
     !$omp end parallel do

@@ -40,9 +40,9 @@ module pd_operators
     real(wp), allocatable :: control(:)                   !! c (n) [N/m^6]; not allocated: none
     real(wp), allocatable, private :: force_tensor(:, :)  !! A (n,4), weighed [N/m^6]
     logical :: weighs = .false.                           !! the sums read weighed fields
-    real(wp), allocatable :: share_of(:)                  !! part of a whole cell that a point owns (n)
+    real(wp), allocatable :: share_of(:)                  !! V over that of a whole cell (n)
     real(wp), allocatable :: weighed(:, :)                !! share u (n,2) [m]
-    real(wp), allocatable :: pull(:, :)                   !! share c u, where Z reads it (n,2) [N/m^5]
+    real(wp), allocatable :: pull(:, :)                   !! share c u, which Z reads (n,2) [N/m^5]
   contains
     procedure :: take_in
     procedure :: gradient_block
@@ -328,8 +328,7 @@ contains
     !$omp shared(self, blocks, volume, u, h, mean, z, parts)
     do block = 1, blocks%count
       call self%control_sums_block(blocks%lo(block), blocks%hi(block), u, z)
-      parts(block, 1) = control_energy_of_block(blocks%lo(block), blocks%hi(block), volume, &
-        self%control, self%k_inverse, h, u, mean, z)
+      parts(block, 1) = control_energy_of_block(self, block, volume, u, h, mean, z)
     end do
     !$omp end parallel do
     energy = blocks%total(parts(:, 1))
@@ -351,28 +350,34 @@ contains
     moments = [block_sum(terms(:, 1)), block_sum(terms(:, 2)), block_sum(terms(:, 3))]
   end function moments_of_block
 
-  !> Energy of the control in rows lo to hi.
-  pure real(wp) function control_energy_of_block(lo, hi, volume, c, k, h, u, mean, z) &
+  !> Energy of the control in one block.
+  pure real(wp) function control_energy_of_block(self, block, volume, u, h, mean, z) &
     result(energy)
-    integer,  intent(in) :: lo, hi
-    real(wp), intent(in), contiguous :: volume(:), c(:), k(:, :), h(:, :), u(:, :), z(:, :)
+    class(operators_t), intent(in) :: self
+    integer,            intent(in) :: block
+    real(wp), intent(in), contiguous :: volume(:), u(:, :), h(:, :), z(:, :)
     real(wp), intent(in) :: mean(2)   !! of u [m]
     real(wp) :: terms(n_block), determinant_of_k, kxx, kyy, kxy
-    integer  :: i
+    integer  :: i, lo, hi
 
+    lo = self%domain%blocks%lo(block)
+    hi = self%domain%blocks%hi(block)
     if (hi - lo + 1 < n_block) terms = 0.0_wp   ! sums go over whole blocks
-    !$omp simd simdlen(8) private(determinant_of_k, kxx, kyy, kxy)
-    do i = lo, hi
-      ! rows without a point have K^-1 = 0 and c = 0: the quotients stay finite
-      determinant_of_k = 1.0_wp / max(k(i, 1) * k(i, 2) - k(i, 3)**2, tiny(1.0_wp))
-      kxx = k(i, 2) * determinant_of_k
-      kyy = k(i, 1) * determinant_of_k
-      kxy = -k(i, 3) * determinant_of_k
-      terms(i - lo + 1) = -0.5_wp * volume(i) * ((u(i, 1) - mean(1)) * z(i, 1) &
-        + (u(i, 2) - mean(2)) * z(i, 2) + c(i) * (kxx * (h(i, 1)**2 + h(i, 3)**2) &
-        + kyy * (h(i, 2)**2 + h(i, 4)**2) + 2.0_wp * kxy * (h(i, 1) * h(i, 2) &
-        + h(i, 3) * h(i, 4))))
-    end do
+    associate (c => self%control, inverse => self%k_inverse)
+      !$omp simd simdlen(8) private(determinant_of_k, kxx, kyy, kxy)
+      do i = lo, hi
+        ! rows without a point have K^-1 = 0 and c = 0: the quotients stay finite
+        determinant_of_k = 1.0_wp &
+          / max(inverse(i, 1) * inverse(i, 2) - inverse(i, 3)**2, tiny(1.0_wp))
+        kxx = inverse(i, 2) * determinant_of_k
+        kyy = inverse(i, 1) * determinant_of_k
+        kxy = -inverse(i, 3) * determinant_of_k
+        terms(i - lo + 1) = -0.5_wp * volume(i) * ((u(i, 1) - mean(1)) * z(i, 1) &
+          + (u(i, 2) - mean(2)) * z(i, 2) + c(i) * (kxx * (h(i, 1)**2 + h(i, 3)**2) &
+          + kyy * (h(i, 2)**2 + h(i, 4)**2) + 2.0_wp * kxy * (h(i, 1) * h(i, 2) &
+          + h(i, 3) * h(i, 4))))
+      end do
+    end associate
     energy = block_sum(terms)
   end function control_energy_of_block
 

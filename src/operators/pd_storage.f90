@@ -54,7 +54,8 @@ contains
     storage%stride = whole_lines(high(1) - low(1) + 1 + reach)
     storage%rows = storage%stride * (high(2) - low(2) + 1 + 2 * reach) + 2 * margin
     allocate (storage%row(storage%n))
-    storage%row = margin + 1 + place(:, 1) - low(1) + storage%stride * (place(:, 2) - low(2) + reach)
+    storage%row = margin + 1 + place(:, 1) - low(1) &
+      + storage%stride * (place(:, 2) - low(2) + reach)
   end function lattice_storage
 
   !> Places in as many whole lines of the cache as hold a number of them.

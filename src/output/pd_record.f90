@@ -2,7 +2,6 @@
 !>
 !> The only module that knows both the physics and the output.
 module pd_record
-  use, intrinsic :: iso_fortran_env, only: compiler_version
   use pd_checkpoint, only: checkpoint_exists, checkpoint_t, read_checkpoint, remove_checkpoints, &
     write_checkpoint
   use pd_clock, only: clock_t
@@ -24,7 +23,6 @@ module pd_record
   use pd_run_description, only: provenance_t, run_description_t
   use pd_schedule, only: rows_due, schedule_t
   use pd_state, only: state_t
-  use pd_version, only: build_flags, code_version, git_hash
   implicit none
   private
 
@@ -61,11 +59,9 @@ contains
   !> Open all outputs: anew, or behind a checkpoint (rows in the history).
   !>
   !> Errors: a file cannot be written; on a restart, results that do not fit the checkpoint.
-  subroutine open_record(input, command, threads, model, schedule, checkpoint, quiet, record, &
-    errors)
+  subroutine open_record(input, provenance, model, schedule, checkpoint, quiet, record, errors)
     type(input_t),      intent(in)    :: input
-    character(*),       intent(in)    :: command      !! the command line
-    integer,            intent(in)    :: threads
+    type(provenance_t), intent(in)    :: provenance
     type(model_t),      intent(in)    :: model
     type(schedule_t),   intent(in)    :: schedule
     type(checkpoint_t), intent(in)    :: checkpoint   !! history_rows 0: a new run, but its clock
@@ -78,7 +74,7 @@ contains
     record%stem = input%run%output_dir//'/'//input%run%name
     record%values = used_values(input)
     restart = checkpoint%history_rows > 0
-    call describe_run(input, command, threads, model, schedule, description)
+    call describe_run(input, provenance, model, schedule, description)
     description%values = record%values
     description%time_step = checkpoint%clock%time_step
     record%columns = description%columns
@@ -105,18 +101,16 @@ contains
   end subroutine open_record
 
   !> Everything that the result file says beside its frames.
-  subroutine describe_run(input, command, threads, model, schedule, description)
-    type(input_t),    intent(in) :: input
-    character(*),     intent(in) :: command
-    integer,          intent(in) :: threads
-    type(model_t),    intent(in) :: model
-    type(schedule_t), intent(in) :: schedule
+  subroutine describe_run(input, provenance, model, schedule, description)
+    type(input_t),      intent(in) :: input
+    type(provenance_t), intent(in) :: provenance
+    type(model_t),      intent(in) :: model
+    type(schedule_t),   intent(in) :: schedule
     type(run_description_t), intent(out) :: description
     character(1), parameter :: axes(2) = ['x', 'y']
     integer :: k
 
-    description%provenance = provenance_t(code_version, git_hash, compiler_version(), &
-      build_flags, command, threads)
+    description%provenance = provenance
     description%title = input%run%title
     description%name = input%run%name
     description%namelist = input%text

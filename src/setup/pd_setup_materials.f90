@@ -80,13 +80,12 @@ contains
     type(material_input_t), intent(in) :: given
     class(law_t), allocatable :: law
 
-    select case (given%model)
-    case ('elastic')
+    if (given%model == 'elastic') then
       allocate (law, source=new_elastic(given%youngs_modulus, given%poissons_ratio))
-    case ('j2')
+    else if (given%model == 'j2') then
       allocate (law, source=new_j2(given%youngs_modulus, given%poissons_ratio, &
         given%kinematic_modulus, given%isotropic_modulus, max(0.0_wp, given%residual_strength)))
-    end select
+    end if
   end function new_law
 
   !> The strain measure of a material.
@@ -94,10 +93,7 @@ contains
     character(*), intent(in) :: name
     class(measure_t), allocatable :: measure
 
-    select case (name)
-    case ('green_lagrange')
-      allocate (green_lagrange_t :: measure)
-    end select
+    if (name == 'green_lagrange') allocate (green_lagrange_t :: measure)
   end function new_measure
 
   !> Control of zero-energy modes after Silling, with the stiffness of each point's material.

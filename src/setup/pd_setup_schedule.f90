@@ -31,15 +31,14 @@ contains
 
     associate (given => input%integration, dt => clock%time_step)
       if (dt <= 0.0_wp) then
-        select case (given%time_step_rule)
-        case ('fixed')
+        if (given%time_step_rule == 'fixed') then
           dt = given%time_step
-        case ('courant')
+        else if (given%time_step_rule == 'courant') then
           dt = given%safety * model%spacing / model%materials%wave_speed()
-        case ('spectral')
+        else if (given%time_step_rule == 'spectral') then
           call find_highest_frequency(model)
           dt = given%safety * 2.0_wp / model%highest_frequency
-        end select
+        end if
       end if
       end_time = given%end_time
       if (is_set(given%final_strain)) end_time = strain_time(given%final_strain)

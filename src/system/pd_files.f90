@@ -126,7 +126,7 @@ contains
     call errors%add('cannot be written to: is the disk full?', where=file%path)
   end subroutine report_write
 
-  !> Put `temporary` in the place of `path` in one step: a reader sees the old file or the new one.
+  !> Rename `temporary` to `path` in one step: a reader sees the old file or the new one.
   !> Where that fails, `temporary` is removed.
   subroutine replace_file(temporary, path, errors)
     character(*),       intent(in)    :: temporary, path
@@ -191,7 +191,7 @@ contains
     end if
   end subroutine write_whole_file
 
-  !> See to it that a folder is there and can be written to.
+  !> Create a folder unless it is there, and check that it can be written to.
   subroutine prepare_folder(path, errors)
     character(*),       intent(in)    :: path
     type(error_list_t), intent(inout) :: errors

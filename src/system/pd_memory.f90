@@ -1,8 +1,8 @@
 !> Arrays that begin at a line of the cache.
 !>
 !> Vector instructions on 64 bytes that lie in two lines take up to twice as long, and what ALLOCATE
-!> returns begins anywhere in a line. Fortran has no way to ask for more; where the linker can give
-!> the calls of malloc in these sources another target (`--wrap=malloc`, GNU C library; the Makefile
+!> returns begins anywhere in a line. Fortran cannot ask for more; where the linker can redirect
+!> the calls of malloc in these sources (`--wrap=malloc`, GNU C library; the Makefile
 !> tries it), they come here. Nothing else depends on it: without it the program is the same, only
 !> slower.
 module pd_memory

@@ -71,7 +71,7 @@ contains
     call c_exit(int(status, c_int))
   end subroutine exit_program
 
-  !> Replace `new` by `old` in one step (POSIX rename is atomic).
+  !> Rename `old` to `new`, replacing that, in one step (POSIX rename is atomic).
   logical function rename_file(old, new) result(done)
     character(*), intent(in) :: old, new
 
@@ -130,9 +130,9 @@ contains
     ignored = c_setenv(c_string(name), c_string(value), 0_c_int)
   end subroutine set_environment
 
-  !> From now on SIGINT and SIGTERM are only noted; `pending_signal` tells. A file that grows over
-  !> a limit (SIGXFSZ) or a reader of the screen that goes away (SIGPIPE) must not kill a run: the
-  !> failing write says so.
+  !> From now on SIGINT and SIGTERM are only noted, for `pending_signal`. A file that exceeds a
+  !> limit (SIGXFSZ) or a closed pipe behind the screen (SIGPIPE) must not kill a run: the write
+  !> that fails reports it.
   subroutine catch_signals()
     type(c_funptr) :: previous, ignore
 
