@@ -1,8 +1,8 @@
-!> Values that the command line puts in place of those of the file: --set group.key=value.
+!> Values of the command line that replace those of the file: --set group.key=value.
 !>
-!> The group may be told from others of its name by its own name or by its number:
-!> boundary.top.velocity, body.2.x_max. What is set then stands among the values of the file, and
-!> goes through the same checks.
+!> A group that is given several times is chosen by its own name or its number:
+!> boundary.top.velocity, body.2.x_max. A value that is set joins those of the file, and goes
+!> through the same checks.
 module pd_input_settings
   use pd_errors, only: error_list_t
   use pd_input_values, only: count_groups, did_you_mean
@@ -28,13 +28,13 @@ module pd_input_settings
 
 contains
 
-  !> Put the settings into the groups of the file, one after the other: the last one counts.
+  !> Put the settings into the groups of the file, in their order: the last one counts.
   !>
-  !> Errors: no group.key=value, a group or key that there is not, a group that the file does not
-  !> have, or has several times without saying which, a value that cannot be read.
+  !> Errors: not of the form group.key=value; an unknown group or key; a group that the file lacks,
+  !> or has several times where the setting does not say which; a value that cannot be read.
   subroutine apply_settings(settings, list, path, groups, errors)
     type(setting_t),                     intent(in)    :: settings(:)
-    type(key_list_t),                    intent(in)    :: list         !! what there is
+    type(key_list_t),                    intent(in)    :: list         !! of all groups and keys
     character(*),                        intent(in)    :: path         !! of the input file
     type(namelist_group_t), allocatable, intent(inout) :: groups(:)
     type(error_list_t),                  intent(inout) :: errors
@@ -156,7 +156,7 @@ contains
     call move_alloc(more, groups)
   end subroutine append
 
-  !> The values as they would stand in the file; the shell has taken the quotes of a text.
+  !> The values as they would be written in the file; the shell has removed the quotes of a text.
   subroutine read_value(parts, list, entry, errors)
     type(parts_t),          intent(in)    :: parts
     type(key_list_t),       intent(in)    :: list
@@ -169,7 +169,7 @@ contains
     entry%key = parts%key
     entry%place = parts%place
     k = find_key(list%keys, parts%group, parts%key)
-    if (k == 0) then   ! check_groups names it
+    if (k == 0) then   ! check_groups reports it
       call take_as_text(parts%value, entry)
       return
     end if
@@ -197,7 +197,7 @@ contains
     entry%values(1)%quoted = .true.
   end subroutine take_as_text
 
-  !> In place of the entry of this key, or beside the others.
+  !> Replace the entry of this key, or add it to the others.
   subroutine replace(group, entry)
     type(namelist_group_t), intent(inout) :: group
     type(namelist_entry_t), intent(in)    :: entry

@@ -90,22 +90,22 @@ contains
   end subroutine allocate_state
 
   !> Reduce the fields that a restart needs to some rows, in their order, and give up the others.
-  subroutine gather(self, places)
+  subroutine gather(self, rows)
     class(state_t), intent(inout) :: self
-    integer,        intent(in)    :: places(:)
+    integer,        intent(in)    :: rows(:)
     type(gathering_t) :: choice
 
-    allocate (choice%places, source=places)
+    allocate (choice%rows, source=rows)
     call self%visit(choice)
   end subroutine gather
 
   !> The state of n rows from that of some of them; the others are unloaded and at rest.
-  subroutine scatter(self, places, n)
+  subroutine scatter(self, rows, n)
     class(state_t), intent(inout) :: self
-    integer,        intent(in)    :: places(:), n
+    integer,        intent(in)    :: rows(:), n
     type(scattering_t) :: spread_out
 
-    allocate (spread_out%places, source=places)
+    allocate (spread_out%rows, source=rows)
     spread_out%n = n
     call self%visit(spread_out)
   end subroutine scatter
