@@ -1,4 +1,4 @@
-!> Answers without a run: --help, --version, --input-reference, --print-input, --check.
+!> Options that answer without a run: --help, --version, --input-reference, --print-input, --check.
 module pd_check
   use, intrinsic :: iso_fortran_env, only: output_unit
   use omp_lib, only: omp_get_max_threads

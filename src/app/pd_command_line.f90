@@ -1,4 +1,4 @@
-!> The command line: options, their help, and what was asked for.
+!> The command line: options, their help, and how they are read.
 module pd_command_line
   use, intrinsic :: iso_fortran_env, only: output_unit
   use pd_errors, only: error_list_t
@@ -121,7 +121,7 @@ contains
     end if
   end subroutine take_input_path
 
-  !> What options need, and what they exclude.
+  !> Check what options need, and what they exclude.
   subroutine check_together(options, errors)
     type(options_t),    intent(in)    :: options
     type(error_list_t), intent(inout) :: errors
@@ -135,7 +135,7 @@ contains
       'results of an earlier run, --force overwrites them: use one of them')
   end subroutine check_together
 
-  !> One --set more.
+  !> Add one --set.
   subroutine add_setting(text, options)
     character(*),    intent(in)    :: text
     type(options_t), intent(inout) :: options
@@ -151,7 +151,7 @@ contains
     call move_alloc(more, options%settings)
   end subroutine add_setting
 
-  !> Name the option that was meant, where one is near.
+  !> Report an unknown option, with the one that was probably meant.
   subroutine report_unknown(word, errors)
     character(*),       intent(in)    :: word
     type(error_list_t), intent(inout) :: errors

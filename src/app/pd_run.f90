@@ -1,4 +1,4 @@
-!> A run: everything that it consists of, and how it begins.
+!> A run: what it consists of, and how it begins.
 module pd_run
   use, intrinsic :: iso_fortran_env, only: compiler_version, int64
   use omp_lib, only: omp_get_max_threads

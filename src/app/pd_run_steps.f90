@@ -1,5 +1,5 @@
-!> What happens around the steps of a run: what is due is written, and a run ends well, fails, or is
-!> stopped by a signal.
+!> What happens around the steps of a run: output that is due is written, and the run ends, fails,
+!> or is stopped by a signal.
 module pd_run_steps
   use, intrinsic :: iso_fortran_env, only: error_unit, int64
   use pd_errors, only: error_list_t, exit_calculation, exit_file, exit_interrupted, &
@@ -18,7 +18,7 @@ module pd_run_steps
 
   public :: due_t, due_after_next_step, write_what_is_due, finish_run
 
-  !> What is written after a step. Known before it: only then has its state to be whole.
+  !> What is written after a step. This is known before the step: only then must its state be whole.
   type :: due_t
     logical :: row = .false., frame = .false., checkpoint = .false.
     logical :: stop = .false.      !! a signal came
@@ -27,8 +27,8 @@ module pd_run_steps
 
 contains
 
-  !> What is due after the next step. A signal that comes during a step is met after the one behind
-  !> it.
+  !> What is due after the next step. A signal that comes during a step takes effect after the next
+  !> one.
   type(due_t) function due_after_next_step(run) result(due)
     type(run_t), intent(in) :: run
     integer(int64) :: now, rate
@@ -49,8 +49,7 @@ contains
     due%anything = due%row .or. due%frame .or. due%checkpoint
   end function due_after_next_step
 
-  !> Write what is due. Before anything of a state is kept it is looked at: a run that gains energy
-  !> has failed.
+  !> Write what is due, but check the state first: a run that gains energy has failed.
   !>
   !> `failed_row`: of the step, see `take_step`.
   subroutine write_what_is_due(due, failed_row, run, outcome)
@@ -83,7 +82,7 @@ contains
       call outcome%end_with(merge(exit_interrupted, exit_terminated, pending_signal() == sigint))
   end subroutine write_what_is_due
 
-  !> As many frames as are asked for at this step, and a checkpoint.
+  !> Write the frames that are due at this step, and a checkpoint.
   subroutine write_frames_and_checkpoint(due, run, errors)
     type(due_t),        intent(in)    :: due
     type(run_t),        intent(inout) :: run
@@ -98,14 +97,14 @@ contains
     call system_clock(run%last_checkpoint)
   end subroutine write_frames_and_checkpoint
 
-  !> Where a run that runs away moves fastest, of the points that move freely.
+  !> The row that moves fastest among those that are free: where a run fails that gains energy.
   pure integer function fastest_row(run)
     type(run_t), intent(in) :: run
 
     fastest_row = maxloc(sum((run%model%points%free * run%state%velocity)**2, dim=2), dim=1)
   end function fastest_row
 
-  !> The calculation has failed: keep the failing state apart from the good frames, and say where.
+  !> The calculation has failed: write the state apart from the valid frames, and report where.
   subroutine fail(reason, row, run, outcome)
     character(*),    intent(in)    :: reason
     integer,         intent(in)    :: row
@@ -127,7 +126,7 @@ contains
     call outcome%end_if_any(errors, exit_calculation)
   end subroutine fail
 
-  !> The end of a run that has reached its end.
+  !> End a run that is complete.
   subroutine finish_run(run, outcome)
     type(run_t),     intent(inout) :: run
     type(outcome_t), intent(inout) :: outcome

@@ -88,7 +88,7 @@ contains
     end associate
   end function summarise
 
-  !> The random field and what it has come to over the body, the weak patch included.
+  !> The random field and its statistics over the body, the weak patch included.
   subroutine add_field(field, material, model, summary)
     type(random_field_input_t), intent(in)    :: field
     type(material_input_t),     intent(in)    :: material
@@ -144,8 +144,8 @@ contains
       + real(model%operators%n, wp) * 8.0_wp * real(state%numbers_per_point() + 10 + 4 + 5, wp)
   end function memory
 
-  !> Wall clock time of the run [s], from the fastest of a few applications of the linear operator
-  !> to this very model.
+  !> Estimated wall clock time of the run [s], from the fastest of a few applications of the linear
+  !> operator to this model.
   real(wp) function estimated_seconds(model, schedule) result(seconds)
     type(model_t),    intent(inout) :: model
     type(schedule_t), intent(in) :: schedule

@@ -60,7 +60,7 @@ module pd_fields
   !> Of the fields that are kept, take the values of some rows only, in their order; deallocate the
   !> others.
   type, extends(field_visitor_t) :: gathering_t
-    integer, allocatable :: places(:)
+    integer, allocatable :: rows(:)
   contains
     procedure :: one_number => gather_1
     procedure :: several_numbers => gather_2
@@ -69,7 +69,7 @@ module pd_fields
   !> Put the values of the fields that are kept into some of n rows; all other values are those of
   !> an unloaded point.
   type, extends(field_visitor_t) :: scattering_t
-    integer, allocatable :: places(:)
+    integer, allocatable :: rows(:)
     integer :: n = 0
   contains
     procedure :: one_number => scatter_1
@@ -134,7 +134,7 @@ contains
     real(wp), allocatable, intent(inout) :: values(:)
     real(wp), allocatable :: chosen(:)
 
-    if (about%kept) allocate (chosen(size(self%places)), source=values(self%places))
+    if (about%kept) allocate (chosen(size(self%rows)), source=values(self%rows))
     call move_alloc(chosen, values)
   end subroutine gather_1
 
@@ -144,8 +144,8 @@ contains
     real(wp), allocatable, intent(inout) :: values(:, :)
     real(wp), allocatable :: chosen(:, :)
 
-    if (about%kept) allocate (chosen(size(self%places), about%width()), &
-      source=values(self%places, :))
+    if (about%kept) allocate (chosen(size(self%rows), about%width()), &
+      source=values(self%rows, :))
     call move_alloc(chosen, values)
   end subroutine gather_2
 
@@ -153,26 +153,26 @@ contains
     class(scattering_t),   intent(inout) :: self
     type(state_field_t),   intent(in)    :: about
     real(wp), allocatable, intent(inout) :: values(:)
-    real(wp), allocatable :: all_places(:)
+    real(wp), allocatable :: all_rows(:)
     type(allocating_t) :: room
 
     room%n = self%n
-    call room%field(about, all_places)
-    if (about%kept) all_places(self%places) = values
-    call move_alloc(all_places, values)
+    call room%field(about, all_rows)
+    if (about%kept) all_rows(self%rows) = values
+    call move_alloc(all_rows, values)
   end subroutine scatter_1
 
   subroutine scatter_2(self, about, values)
     class(scattering_t),   intent(inout) :: self
     type(state_field_t),   intent(in)    :: about
     real(wp), allocatable, intent(inout) :: values(:, :)
-    real(wp), allocatable :: all_places(:, :)
+    real(wp), allocatable :: all_rows(:, :)
     type(allocating_t) :: room
 
     room%n = self%n
-    call room%field(about, all_places)
-    if (about%kept) all_places(self%places, :) = values
-    call move_alloc(all_places, values)
+    call room%field(about, all_rows)
+    if (about%kept) all_rows(self%rows, :) = values
+    call move_alloc(all_rows, values)
   end subroutine scatter_2
 
   subroutine count_1(self, about, values)

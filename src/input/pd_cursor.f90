@@ -1,4 +1,4 @@
-!> A place in the text of a namelist file, and the steps by which a scanner moves on.
+!> A position in the text of a namelist file, and how a scanner moves on from it.
 module pd_cursor
   use pd_text, only: lower_case, shortened
   implicit none
@@ -63,7 +63,7 @@ contains
     self%at = i
   end function token
 
-  !> Whether `=` comes next, blanks, line ends and comments aside; the place stays.
+  !> Whether `=` comes next, apart from blanks, line ends and comments; the cursor does not move.
   logical function is_before_equals(self) result(is_next)
     class(cursor_t), intent(inout) :: self
     integer :: at, line
@@ -76,7 +76,7 @@ contains
     self%line = line
   end function is_before_equals
 
-  !> Pass over blanks, line ends and comments, and over commas where asked.
+  !> Skip blanks, line ends and comments, and commas if asked to.
   subroutine skip_blank(self, commas)
     class(cursor_t),   intent(inout) :: self
     logical, optional, intent(in)    :: commas
@@ -112,7 +112,7 @@ contains
     if (i < len(self%text)) ends_line = self%text(i + 1:i + 1) /= line_feed
   end function ends_line
 
-  !> On to the end of the present line.
+  !> Move to the end of the present line.
   pure subroutine skip_line(self)
     class(cursor_t), intent(inout) :: self
 

@@ -1,4 +1,4 @@
-!> From a namelist file to checked values: every mistake of the file is listed in one go.
+!> From a namelist file to checked values: all mistakes of the file are listed at once.
 module pd_input
   use pd_errors, only: error_list_t
   use pd_input_checks, only: check_model, resolved_path
@@ -24,8 +24,8 @@ module pd_input
 
 contains
 
-  !> Read and check an input file, with the values that `settings` put in place of the file's:
-  !> 'group.key=value' each, as `--set` takes them.
+  !> Read and check an input file. `settings`, each 'group.key=value' as `--set` takes it, replace
+  !> values of the file.
   !>
   !> Without errors `input` holds the values as used: defaults filled, every allocatable allocated,
   !> lists and tables of size 0 where absent, numbers without default `unset` where not given.
@@ -81,7 +81,7 @@ contains
     call check_loads(input, groups, errors)
   end subroutine read_groups
 
-  !> All values of the file and the defaults of the rest.
+  !> All values of the file, and defaults for the rest.
   subroutine fill(groups, input)
     type(namelist_group_t), intent(in)    :: groups(:)
     type(input_t),          intent(inout) :: input

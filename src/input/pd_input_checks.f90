@@ -1,7 +1,7 @@
-!> What several keys together must fulfil: points, bodies, control.
+!> Conditions on several keys together: points, bodies, control.
 !>
-!> A key that is absent or damaged holds `unset` or an empty text here; its checks are passed over,
-!> because it has been complained about already.
+!> A key that is missing or damaged holds `unset` or an empty text here; its checks are skipped,
+!> because the problem has been reported already.
 module pd_input_checks
   use pd_errors, only: error_list_t
   use pd_input_types, only: body_input_t, input_t
@@ -48,8 +48,8 @@ contains
     end do
   end function is_cloud
 
-  !> Path of a file that the input names: itself where it is absolute, else in the folder of the
-  !> input file, else, where it is not there, in the working directory.
+  !> Path of a file that the input names: as it is if absolute, else in the folder of the input
+  !> file, or, if it is not there, in the working directory.
   function resolved_path(input, file) result(path)
     type(input_t), intent(in) :: input
     character(*),  intent(in) :: file
@@ -73,7 +73,7 @@ contains
     call errors%add('the key is missing, it is needed '//why, where=place_of(group, key))
   end subroutine add_missing
 
-  !> A key that is given although it would be without effect.
+  !> Report a key that is given although it would have no effect.
   subroutine add_useless(group, key, why, errors)
     type(namelist_group_t), intent(in)    :: group
     character(*),           intent(in)    :: key, why
@@ -224,7 +224,7 @@ contains
       allowed=number_text(rounded(first + anint(steps)*spacing))//', or fit = ''nearest''')
   end subroutine check_fit
 
-  !> The multiples of spacing below and above an extent of so many steps, for a message.
+  !> The multiples of the spacing below and above an extent, given in spacings, for a message.
   pure function neighbours(steps, spacing) result(text)
     real(wp), intent(in) :: steps, spacing
     character(:), allocatable :: text
@@ -236,7 +236,7 @@ contains
     text = 'nearest '//text
   end function neighbours
 
-  !> The number to ten digits: differences and products carry round-off that messages should not.
+  !> The number to ten digits, without the round-off of differences and products.
   pure real(wp) function rounded(x)
     real(wp), intent(in) :: x
     character(20) :: buffer

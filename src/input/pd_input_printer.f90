@@ -1,6 +1,6 @@
 !> Visitor that writes an input file with all values as used.
 !>
-!> A key that is refused where it has no effect, and that the file did not give, stands in a
+!> A key that is refused where it has no effect, and that the file did not give, is written as a
 !> comment: the file can be read again, and gives the same values as used.
 module pd_input_printer
   use pd_input_types, only: input_t
@@ -24,7 +24,7 @@ module pd_input_printer
     type(namelist_group_t) :: given                    !! the present one
     integer :: k = 0                                   !! it is the k-th of its name
     character(:), allocatable :: text                  !! of the present group
-    logical :: lacks = .false.                         !! a key that must be there has no value
+    logical :: lacks = .false.                         !! a required key has no value
   contains
     procedure :: group => begin_group
     procedure :: take_real => print_real
@@ -68,7 +68,7 @@ contains
     self%lacks = .false.
   end subroutine begin_group
 
-  !> A group that the file does not have, and that cannot stand there without values, is left out.
+  !> A group that the file does not have, and that would lack required values, is left out.
   subroutine end_group(self)
     class(printer_t), intent(inout) :: self
 
@@ -76,7 +76,7 @@ contains
     self%text = ''
   end subroutine end_group
 
-  !> One key; an empty value is none.
+  !> One key; an empty value means that there is none.
   subroutine put(self, key, value)
     class(printer_t), intent(inout) :: self
     type(key_t),      intent(in)    :: key
@@ -104,7 +104,7 @@ contains
     end if
   end subroutine print_real
 
-  !> A number that the key may not hold stands for none.
+  !> A number out of the range of the key means that there is none.
   subroutine print_integer(self, key, i)
     class(printer_t), intent(inout) :: self
     type(key_t),      intent(in)    :: key

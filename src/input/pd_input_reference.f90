@@ -110,7 +110,7 @@ contains
     if (more) text = ','
   end function comma
 
-  !> One key as a JSON object. What there is not, is null; `count` null: one or more values.
+  !> One key as a JSON object. What does not exist is null; `count` null: one or more values.
   pure function object(key) result(text)
     type(key_t), intent(in) :: key
     character(:), allocatable :: text, kind, count, default

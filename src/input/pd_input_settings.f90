@@ -1,8 +1,8 @@
-!> Values that the command line puts in place of those of the file: --set group.key=value.
+!> Values of the command line that replace those of the file: --set group.key=value.
 !>
-!> The group may be told from others of its name by its own name or by its number:
-!> boundary.top.velocity, body.2.x_max. What is set then stands among the values of the file, and
-!> goes through the same checks. Nothing behind the = takes a key out, `group.key=`, or a group,
+!> A group that is given several times is chosen by its own name or its number:
+!> boundary.top.velocity, body.2.x_max. A value that is set joins those of the file, and goes
+!> through the same checks. Nothing behind the = takes a key out, `group.key=`, or a group,
 !> `group=` and `group.name=`; a name that no group of this kind has adds one.
 module pd_input_settings
   use pd_errors, only: error_list_t
@@ -30,13 +30,13 @@ module pd_input_settings
 
 contains
 
-  !> Put the settings into the groups of the file, one after the other: the last one counts.
+  !> Put the settings into the groups of the file, in their order: the last one counts.
   !>
-  !> Errors: no group.key=value, a group or key that there is not, a group that the file does not
-  !> have, or has several times without saying which, a value that cannot be read.
+  !> Errors: not of the form group.key=value; an unknown group or key; a group that the file lacks,
+  !> or has several times where the setting does not say which; a value that cannot be read.
   subroutine apply_settings(settings, list, path, groups, errors)
     type(setting_t),                     intent(in)    :: settings(:)
-    type(key_list_t),                    intent(in)    :: list         !! what there is
+    type(key_list_t),                    intent(in)    :: list         !! of all groups and keys
     character(*),                        intent(in)    :: path         !! of the input file
     type(namelist_group_t), allocatable, intent(inout) :: groups(:)
     type(error_list_t),                  intent(inout) :: errors
@@ -218,7 +218,7 @@ contains
     call move_alloc(more, groups)
   end subroutine append
 
-  !> The values as they would stand in the file; the shell has taken the quotes of a text.
+  !> The values as they would be written in the file; the shell has removed the quotes of a text.
   subroutine read_value(parts, list, entry, errors)
     type(parts_t),          intent(in)    :: parts
     type(key_list_t),       intent(in)    :: list
@@ -230,7 +230,7 @@ contains
 
     entry = text_entry(parts%key, parts%value, parts%place)
     k = find_key(list%keys, parts%group, parts%key)
-    if (k == 0) return   ! check_groups names it
+    if (k == 0) return   ! check_groups reports it
     if (list%keys(k)%kind == kind_text .and. verify(parts%value(1:1), '''"') > 0) return
     call scan_namelist(parts%place, '&a b = '//parts%value//' /', scanned, problems)
     if (problems%count() == 0 .and. size(scanned) == 1) then
@@ -243,7 +243,7 @@ contains
                     allowed=allowed_values(list%keys(k)))
   end subroutine read_value
 
-  !> In place of the entry of this key, or beside the others.
+  !> Replace the entry of this key, or add it to the others.
   subroutine replace(group, entry)
     type(namelist_group_t), intent(inout) :: group
     type(namelist_entry_t), intent(in)    :: entry

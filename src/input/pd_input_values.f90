@@ -1,7 +1,7 @@
-!> The groups of a file against the keys that there are.
+!> The groups of a file, checked against the known keys.
 !>
-!> `check_groups` names everything that is wrong with one key alone and marks it as damaged; the
-!> reader (`pd_key_reader`) then only fetches.
+!> `check_groups` reports everything that is wrong with a key by itself, and marks it as damaged;
+!> the reader (`pd_key_reader`) then only fetches values.
 module pd_input_values
   use pd_errors, only: error_list_t
   use pd_key_list, only: key_list_t
@@ -20,11 +20,11 @@ module pd_input_values
 
 contains
 
-  !> Check every group and key of a file for itself: unknown, missing and repeated ones, and
+  !> Check every group and key of a file by itself: unknown, missing and repeated ones, and
   !> values of the wrong kind, number or range. What is wrong is marked as damaged.
   subroutine check_groups(groups, list, errors, path)
     type(namelist_group_t), intent(inout) :: groups(:)
-    type(key_list_t),       intent(in)    :: list          !! what there is
+    type(key_list_t),       intent(in)    :: list          !! of all groups and keys
     type(error_list_t),     intent(inout) :: errors
     character(*),           intent(in)    :: path
     integer :: i, k
@@ -54,13 +54,13 @@ contains
     type(error_list_t),     intent(inout) :: errors
     character(len(known%name)) :: names(size(known))
 
-    if (group%name == '') return   ! the scanner has complained
+    if (group%name == '') return   ! the scanner has reported it
     names = known%name
     call errors%add('unknown group'//did_you_mean(group%name, names), where=place_of(group), &
                     found='&'//shortened(group%name), allowed=quoted_list(names, bare=.true.))
   end subroutine report_unknown_group
 
-  !> Group i stands there a second time.
+  !> Group i is given a second time.
   subroutine report_repeated(groups, i, errors)
     type(namelist_group_t), intent(in)    :: groups(:)
     integer,                intent(in)    :: i
@@ -75,7 +75,7 @@ contains
     end do
   end subroutine report_repeated
 
-  !> All entries of one group, and the required keys that it lacks.
+  !> Check all entries of one group, and that no required key is missing.
   subroutine check_keys(group, keys, errors)
     type(namelist_group_t), intent(inout) :: group
     type(key_t),            intent(in)    :: keys(:)
@@ -117,7 +117,7 @@ contains
                     allowed=quoted_list(keys_of(keys, group%name), bare=.true.))
   end subroutine report_unknown_key
 
-  !> The values of entry i of a group: number of them, kind and range.
+  !> Check the values of entry i of a group: their number, kind and range.
   subroutine check_entry(group, i, key, errors)
     type(namelist_group_t), intent(inout) :: group
     integer,                intent(in)    :: i
@@ -147,7 +147,7 @@ contains
     group%entries(i)%damaged = .true.
   end subroutine check_entry
 
-  !> What is wrong with one value of a key, empty where nothing is.
+  !> What is wrong with one value of a key; empty if nothing is.
   pure function problem_of(value, key) result(problem)
     type(namelist_value_t), intent(in) :: value
     type(key_t),            intent(in) :: key
@@ -204,7 +204,7 @@ contains
     if (outside) problem = 'out of range'
   end function problem_of_range
 
-  !> The end of a message: the name that was meant, where one is near.
+  !> The end of a message: the name that was probably meant, if there is a similar one.
   pure function did_you_mean(word, candidates) result(text)
     character(*), intent(in) :: word, candidates(:)
     character(:), allocatable :: text
@@ -230,7 +230,7 @@ contains
     if (value%quoted) text = ''''//text//''''
   end function as_written
 
-  !> How often a group stands in the file.
+  !> How often a group is given in the file.
   pure integer function count_groups(groups, name) result(n)
     type(namelist_group_t), intent(in) :: groups(:)
     character(*),           intent(in) :: name
@@ -242,7 +242,7 @@ contains
     end do
   end function count_groups
 
-  !> The k-th group of a name; one without entries and of line 0 where there is none.
+  !> The k-th group of a name; one without entries and with line 0 if there is none.
   pure function group_named(groups, name, k, path) result(group)
     type(namelist_group_t), intent(in) :: groups(:)
     character(*),           intent(in) :: name, path

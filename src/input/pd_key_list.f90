@@ -1,4 +1,4 @@
-!> Visitor that lists groups and keys: what the checks of a file and the reference ask.
+!> Visitor that lists groups and keys, for the checks of a file and for the reference.
 module pd_key_list
   use pd_keys, only: find_group, group_key_t, key_t, key_visitor_t
   use pd_kinds, only: wp

@@ -1,7 +1,7 @@
 !> Visitor that fetches the values of a scanned file: as given, else the default, else nothing.
 !>
-!> What is wrong with a value has been complained about by `check_groups`, which marks it as
-!> damaged; a damaged value reads as one that is not given and has no default.
+!> `check_groups` has reported what is wrong with a value, and marked it as damaged; a damaged
+!> value is read as if it were not given and had no default.
 module pd_key_reader
   use pd_input_values, only: group_named
   use pd_keys, only: group_key_t, key_t, key_visitor_t
@@ -30,7 +30,7 @@ module pd_key_reader
 
 contains
 
-  !> Read these groups of a file. The groups of one name are to be visited in their order.
+  !> Read these groups of a file. Groups of one name must be visited in their order.
   subroutine open_groups(self, groups, path)
     class(key_reader_t),    intent(inout) :: self
     type(namelist_group_t), intent(in)    :: groups(:)

@@ -1,8 +1,8 @@
 !> What a key of the input file is, and who visits it.
 !>
 !> A group of keys is a type with a procedure `visit`, which names each of its keys once: the
-!> component of the value, unit, default, range, sentence. Whatever is done with all keys is a
-!> visitor: reading, listing as used, printing, the reference.
+!> component of the value, unit, default, range, sentence. Everything that is done with all keys is
+!> a visitor: reading, listing as used, printing, the reference.
 module pd_keys
   use pd_kinds, only: is_set, unset, wp
   use pd_text, only: integer_text, number_text, quoted_list
@@ -28,8 +28,9 @@ module pd_keys
   integer, parameter :: any_count = 0
   integer, parameter :: length = 32, long = 240
 
-  !> One key. Texts: `choices` are the words allowed, apart by blanks (none: any text), `is_name`
-  !> asks for a-z, 0-9 and _. Numbers: `count` is how many are due (any_count: one or more).
+  !> One key. Texts: `choices` are the words allowed, separated by blanks (none: any text),
+  !> `is_name` asks for a-z, 0-9 and _. Numbers: `count` is how many are required (any_count: one or
+  !> more).
   type :: key_t
     character(length) :: name = ''
     character(length) :: group = ''    !! filled by the list of keys
@@ -202,7 +203,7 @@ contains
     end do
   end function keys_of
 
-  !> The words of a text, apart by blanks.
+  !> The words of a text that are separated by blanks.
   pure function words_of(text) result(words)
     character(*), intent(in) :: text
     character(length), allocatable :: words(:)

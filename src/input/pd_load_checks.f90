@@ -1,7 +1,7 @@
-!> What several keys together must fulfil: pressures, and platens that move under a load.
+!> Conditions on several keys together: pressures, and platens that move under a load.
 !>
-!> A key that is absent or damaged holds `unset` or an empty text here; its checks are passed over,
-!> because it has been complained about already.
+!> A key that is missing or damaged holds `unset` or an empty text here; its checks are skipped,
+!> because the problem has been reported already.
 module pd_load_checks
   use pd_errors, only: error_list_t
   use pd_input_checks, only: add_useless, is_cloud
@@ -79,7 +79,7 @@ contains
       allowed='0 as component '//integer_text(along)//', or contact = ''rough''')
   end subroutine check_traction
 
-  !> What asks for the motion of the platens before the run.
+  !> Keys that need the motion of the platens before the run.
   subroutine check_strains(input, groups, errors)
     type(input_t),          intent(in)    :: input
     type(namelist_group_t), intent(in)    :: groups(:)

@@ -1,7 +1,7 @@
-!> What several keys together must fulfil: materials, weak patch, random field.
+!> Conditions on several keys together: materials, weak patch, random field.
 !>
-!> A key that is absent or damaged holds `unset` or an empty text here; its checks are passed over,
-!> because it has been complained about already.
+!> A key that is missing or damaged holds `unset` or an empty text here; its checks are skipped,
+!> because the problem has been reported already.
 module pd_material_checks
   use pd_errors, only: error_list_t
   use pd_input_checks, only: add_missing
@@ -16,7 +16,7 @@ module pd_material_checks
 
   public :: check_materials
 
-  integer, parameter :: name_length = 48   !! of a name, which check_groups sees to
+  integer, parameter :: name_length = 48   !! of a name; check_groups checks it
 
 contains
 
@@ -75,7 +75,7 @@ contains
     do j = 1, size(names)
       names(j) = input%materials(j)%name
     end do
-    if (size(names) == 0 .or. any(names == '')) return   ! that has been complained about
+    if (size(names) == 0 .or. any(names == '')) return   ! that has been reported
     associate (name => input%bodies(k)%material)
       if (name == '' .or. any(names == name)) return
       call errors%add('unknown material'//did_you_mean(name, names), &
@@ -90,7 +90,7 @@ contains
     type(error_list_t),     intent(inout) :: errors
     real(wp) :: h_i, h_k, three_g
 
-    ! Plasticity keys are left alone with 'elastic', so that one word switches the model.
+    ! With 'elastic' plasticity keys are allowed, so that one word switches the model.
     if (m%model /= 'j2') return
     if (.not. is_given(group, 'yield_stress')) &
       call add_missing(group, 'yield_stress', 'for model = ''j2''', errors)

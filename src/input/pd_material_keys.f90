@@ -9,7 +9,7 @@ module pd_material_keys
 
   public :: material_input_t, imperfection_input_t, random_field_input_t
 
-  character(*), parameter :: default_material = 'material'   !! name of one without a name
+  character(*), parameter :: default_material = 'material'   !! name of a material without one
 
   type :: material_input_t
     character(:), allocatable :: name, model, strain_measure

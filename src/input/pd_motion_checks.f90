@@ -1,7 +1,7 @@
-!> What several keys together must fulfil: boundaries, platens, end of the run, frames.
+!> Conditions on several keys together: boundaries, platens, end of the run, frames.
 !>
-!> A key that is absent or damaged holds `unset` or an empty text here; its checks are passed over,
-!> because it has been complained about already.
+!> A key that is missing or damaged holds `unset` or an empty text here; its checks are skipped,
+!> because the problem has been reported already.
 module pd_motion_checks
   use pd_errors, only: error_list_t
   use pd_input_checks, only: add_missing, add_useless, is_cloud
@@ -143,7 +143,7 @@ contains
 
   end subroutine check_movement
 
-  !> Name the first value of a list that is not above the one before it.
+  !> Report the first value of a list that is not above the one before it.
   subroutine check_increasing(list, key, group, errors)
     real(wp),               intent(in)    :: list(:)
     character(*),           intent(in)    :: key
@@ -202,7 +202,7 @@ contains
     type(error_list_t),     intent(inout) :: errors
     real(wp), parameter :: max_steps = 2.0e9_wp
 
-    if (group%line == 0) return   ! the group is missing, and that has been said
+    if (group%line == 0) return   ! the group is missing, and that has been reported
     associate (t => input%integration)
       if (is_given(group, 'end_time') .and. is_given(group, 'final_strain')) then
         call errors%add('the end of the run is given twice', &
@@ -236,7 +236,7 @@ contains
     end associate
   end subroutine check_integration
 
-  !> Everything that asks for platens, and whether they come together.
+  !> Everything that needs platens, and whether they approach each other.
   subroutine check_platens(input, groups, errors)
     type(input_t),          intent(in)    :: input
     type(namelist_group_t), intent(in)    :: groups(:)
@@ -276,7 +276,7 @@ contains
                       allowed=needs_platens)
     end subroutine refuse
 
-    !> Whether the platens ever come so near: their approach grows without end, or far enough
+    !> Whether the platens ever come so close: their approach grows without end, or far enough
     !> within the tables.
     subroutine check_reached(strain, group, key)
       real(wp),               intent(in) :: strain
@@ -300,7 +300,7 @@ contains
   end subroutine check_platens
 
   !> Whether there is no motion of the platens to look at: one of them moves under a load, or has a
-  !> table of another length than its times, which has been complained about.
+  !> table of another length than its times, which has been reported.
   pure logical function approach_unknown(input) result(unknown)
     type(input_t), intent(in) :: input
     integer :: i

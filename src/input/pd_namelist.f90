@@ -1,13 +1,13 @@
 !> Scanner of namelist files: text -> groups of keys with their values, as written.
 !>
 !> Fortran's own namelist read is not used: it stops at the first mistake, cannot tell a missing
-!> `/` from a missing group, leaves values set after an error and passes over a group that stands
-!> twice. This scanner names every mistake in one go, each with its line.
+!> `/` from a missing group, leaves values set after an error and ignores a group that is given
+!> twice. This scanner reports all mistakes at once, each with its line.
 !>
-!> Accepted: &group key = values ... /, names without regard to case, values and keys apart by
+!> Accepted: &group key = values ... /, names without regard to case, values and keys separated by
 !> blanks, tabs, commas or line ends of any kind, `!` comments, texts in '...' or "..." with the
 !> quote doubled inside, repeat counts (3*0.0). Not accepted: null values (a = ,,), indexed keys
-!> (a(2) = 1), `&end`, texts that go on in the next line.
+!> (a(2) = 1), `&end`, texts that continue on the next line.
 module pd_namelist
   use pd_cursor, only: blanks, cursor_t, line_ends, quotes
   use pd_errors, only: error_list_t
@@ -26,7 +26,7 @@ module pd_namelist
   integer, parameter :: max_groups = 1000
   integer, parameter :: max_total = 200000    !! values of a file
 
-  !> The text with a place in it, and what has been found so far.
+  !> The text with a cursor, and what has been found so far.
   type, extends(cursor_t) :: scanner_t
     character(:), allocatable :: file
     integer :: n_values = 0
@@ -38,12 +38,12 @@ contains
   !> Split the text of a namelist file into groups, in their order.
   !>
   !> Errors: every breach of the syntax, with file and line; after `max_problems` of them the rest
-  !> of the file is passed over.
+  !> of the file is ignored.
   subroutine scan_namelist(path, text, groups, errors, complete)
     character(*),                        intent(in)    :: path, text
     type(namelist_group_t), allocatable, intent(out)   :: groups(:)
     type(error_list_t),                  intent(inout) :: errors
-    logical,                  optional,  intent(out)   :: complete   !! whole file looked at
+    logical,                  optional,  intent(out)   :: complete   !! the whole file was read
     type(scanner_t) :: scanner
     type(namelist_group_t), allocatable :: list(:)
     integer :: i, n
@@ -74,8 +74,8 @@ contains
     if (present(complete)) complete = .not. scanner%stopped
   end subroutine scan_namelist
 
-  !> Control characters; a byte of zero means that this is no text, and ends the scan.
-  !> The mark that some editors put before UTF-8 is passed over.
+  !> Report control characters; a byte of zero means that this is no text file, and ends the scan.
+  !> The mark that some editors put before UTF-8 text is ignored.
   subroutine check_characters(scanner, errors)
     type(scanner_t),    intent(inout) :: scanner
     type(error_list_t), intent(inout) :: errors
@@ -106,7 +106,7 @@ contains
     end do
   end subroutine check_characters
 
-  !> Text that belongs to no group: one message, on to the next line that starts with `&`.
+  !> Text that belongs to no group: report it once, and go on at the next line that starts with `&`.
   subroutine skip_outside(scanner, errors)
     type(scanner_t),    intent(inout) :: scanner
     type(error_list_t), intent(inout) :: errors
@@ -122,7 +122,7 @@ contains
     end do
   end subroutine skip_outside
 
-  !> One group, from its & to behind its /.
+  !> One group, from its & to its /.
   subroutine scan_group(scanner, group, errors)
     type(scanner_t),        intent(inout) :: scanner
     type(namelist_group_t), intent(out)   :: group
@@ -165,7 +165,7 @@ contains
     end do
   end subroutine scan_group
 
-  !> Whether `&end` comes next; it is passed over then.
+  !> Whether `&end` comes next; if so it is skipped.
   logical function ends_old_style(scanner) result(ends)
     type(scanner_t), intent(inout) :: scanner
     integer :: start
@@ -230,7 +230,7 @@ contains
     list(n) = entry
   end subroutine scan_entry
 
-  !> Whether a word can be a key: letters, digits and _, the first no digit.
+  !> Whether a word can be a key: letters, digits and _, not beginning with a digit.
   pure logical function is_key(word)
     character(*), intent(in) :: word
 
@@ -238,7 +238,7 @@ contains
     if (is_key) is_key = verify(word(1:1), '0123456789') == 1
   end function is_key
 
-  !> The values behind the `=` of a key, up to the next key or the end of the group.
+  !> The values after the `=` of a key, up to the next key or the end of the group.
   subroutine scan_values(scanner, group, entry, errors)
     type(scanner_t),        intent(inout) :: scanner
     character(*),           intent(in)    :: group
@@ -399,7 +399,7 @@ contains
     end if
   end subroutine scan_text
 
-  !> Append a problem with its place; the last one allowed says that there are more.
+  !> Report a problem with its line; the last one allowed says that there are more.
   subroutine complain(scanner, errors, what, line, found, allowed)
     type(scanner_t),    intent(inout)        :: scanner
     type(error_list_t), intent(inout)        :: errors

@@ -1,4 +1,4 @@
-!> Platens as the input describes them: which boundaries they are, and how they come together.
+!> Platens as the input describes them: which boundaries they are, and how they approach.
 module pd_platen_checks
   use pd_input_types, only: boundary_input_t, input_t
   use pd_kinds, only: is_set, unset, wp
@@ -27,7 +27,7 @@ contains
     end associate
   end function platens_of
 
-  !> Whether there are platens, and one of them moves under a load: how, only the run will tell.
+  !> Whether there are platens one of which moves under a load: its motion is known only in the run.
   pure logical function platen_under_load(input) result(found)
     type(input_t), intent(in) :: input
     integer :: i

@@ -83,7 +83,7 @@ contains
       self%checkpoint_every)
   end subroutine visit_output
 
-  !> Frames without a request for any.
+  !> Without a request for frames there is a default number of them.
   subroutine complete_output(self)
     class(output_input_t), intent(inout) :: self
 

@@ -1,4 +1,4 @@
-!> The values of a run as lines "group.key = value": for the provenance of results, and to name
+!> The values of a run as lines "group.key = value": for the provenance of results, and to report
 !> what differs from the run that a checkpoint belongs to.
 module pd_used_values
   use pd_errors, only: error_list_t
@@ -37,9 +37,9 @@ module pd_used_values
 
 contains
 
-  !> All values as used, defaults included, in the order of the reference; numbers with as many
-  !> digits as read back to the same bits, 'none' where there is no value. Bodies carry their
-  !> number, boundaries, pressures and named materials their name: body(1).x_min,
+  !> All values as used, defaults included, in the order of the reference; numbers with as
+  !> many digits as read back to the same bits, 'none' if there is no value. Bodies are labelled
+  !> with their number, boundaries, pressures and named materials with their name: body(1).x_min,
   !> boundary(top).velocity, material(clay).density.
   function used_values(input) result(values)
     type(input_t), intent(in) :: input
@@ -68,7 +68,7 @@ contains
     end do
   end function lines
 
-  !> A group that may stand several times carries its number, until its name is known.
+  !> A group that may be given several times is labelled with its number until its name is known.
   subroutine begin_group(self, about)
     class(used_list_t), intent(inout) :: self
     type(group_key_t),  intent(in)    :: about
@@ -98,8 +98,8 @@ contains
     self%list(self%n)%text = self%label//'.'//key//equals//value
   end subroutine add
 
-  !> The name of a group that may stand several times is its label, and no line of its own. A name
-  !> that is the default labels nothing: 'material.density', where there is but one material.
+  !> The name of a group that may be given several times is its label, without a line of its own.
+  !> The default name is no label: 'material.density' if there is only one material.
   subroutine list_text(self, key, text)
     class(used_list_t),        intent(inout) :: self
     type(key_t),               intent(in)    :: key
@@ -165,7 +165,7 @@ contains
     if (n == 0) text = 'none'
   end function numbers_text
 
-  !> Name every value in which a run that is to go on differs from the run so far.
+  !> Report every value in which a run that is to continue differs from the run so far.
   !>
   !> May differ: everything of output, run.title, run.output_dir, run.operators, and a later end.
   subroutine compare_used(old, new, errors)
@@ -216,7 +216,7 @@ contains
     is_end = key == 'integration.end_time' .or. key == 'integration.final_strain'
   end function is_end
 
-  !> Whether both lines give the end of the run in the same manner, and the new one a later end.
+  !> Whether both lines give the end of the run in the same way, and the new one a later end.
   pure logical function is_later_end(old, new)
     character(*), intent(in) :: old, new
     character(:), allocatable :: problem_old, problem_new

@@ -19,7 +19,7 @@ module pd_loaded_platen
   public :: loaded_platen_t, new_loaded_platen
 
   type, extends(support_t) :: loaded_platen_t
-    logical,  private :: as_one(2) = .false.             !! components in which its points move so
+    logical,  private :: as_one(2) = .false.             !! components in which it is rigid
     real(wp), private :: traction(2) = 0.0_wp            !! from outside, at full load [Pa]
     real(wp), private :: applied(2) = 0.0_wp             !! F, the same over its length [N/m]
     type(table_t), private :: factor                     !! r
@@ -36,7 +36,7 @@ module pd_loaded_platen
 contains
 
   !> Platen under a traction over a length in each component; it has no effect in components in
-  !> which the points do not move as one.
+  !> which the points can move apart.
   pure type(loaded_platen_t) function new_loaded_platen(set, as_one, traction, length, ramp_time) &
     result(platen)
     type(point_set_t), intent(in) :: set

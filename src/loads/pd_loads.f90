@@ -1,8 +1,8 @@
-!> Loads: what adds to the force density, and does work on the motion.
+!> Loads: they add to the force density, and do work on the motion.
 !>
 !> The time loop knows only this interface. A new kind is a module with an extension of `load_t`
-!> and a line in `pd_setup_loads`. Loads enter the force density after the internal forces, and do
-!> their work on v^{n+1/2}.
+!> and a line in `pd_setup_loads`. Loads are added to the force density after the internal forces,
+!> and do their work on v^{n+1/2}.
 !> Source: doc/theory.md, section 7.
 module pd_loads
   use pd_kinds, only: wp
@@ -48,7 +48,7 @@ module pd_loads
 
   end interface
 
-  !> A place for a load of any kind.
+  !> Holds a load of any kind.
   type :: load_item_t
     class(load_t), allocatable :: load
   end type load_item_t

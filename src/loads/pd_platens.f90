@@ -1,7 +1,7 @@
 !> Platens: two supports that approach each other along an axis.
 !>
-!> All that is known of their motion is taken from the supports once; during a run the strain
-!> follows from the displacements, whatever moves the platens.
+!> What is known of their motion beforehand is taken from the supports once; during a run the
+!> strain follows from the displacements, whatever moves the platens.
 !> Source: doc/theory.md, section 7.
 module pd_platens
   use pd_kinds, only: wp
@@ -80,8 +80,8 @@ contains
     if (allocated(platens%strain%times)) time = platens%strain%first_time(strain)
   end function time_of_strain
 
-  !> Velocity of the affine frame of the platens at both ends: the damping acts against it. Zero
-  !> where there are no platens.
+  !> Velocity of the affine frame of the platens at both ends: the damping acts relative to it. Zero
+  !> if there are no platens.
   pure subroutine reference_ends(platens, t, lower, upper)
     type(platens_t), intent(in)  :: platens
     real(wp),        intent(in)  :: t                     !! [s]

@@ -1,8 +1,8 @@
 !> Pressure on a side of the body: a dead load, and which points carry how much of it.
 !>
 !> Families are cut off at a surface, so a homogeneous stress P is in equilibrium only with forces
-!> P N_i on the points near it. A pressure applies just these: N_i is its weight at a point. Loads
-!> on the outermost points alone would leave them with several times the stress.
+!> P N_i on the points near it. A pressure applies exactly these: N_i is its weight at a point.
+!> Loads on the outermost points alone would put several times the stress there.
 !> Source: doc/theory.md, section 7.
 module pd_pressure
   use pd_kinds, only: n_block, wp
@@ -27,14 +27,14 @@ module pd_pressure
     real(wp), private :: value = 0.0_wp       !! at full load [Pa]
     real(wp), private :: span(2) = [-huge(1.0_wp), huge(1.0_wp)]   !! along the side [m]
     real(wp), private :: ramp_time = 0.0_wp   !! full load from then on [s]
-    logical,  private :: on_layers = .false.  !! layers that continue the body carry it too
+    logical,  private :: on_layers = .false.  !! also on layers that continue the body
   contains
     procedure :: add_forces
     procedure :: work
     procedure :: description
   end type pressure_t
 
-  !> What a pressure has to know of a side: its points and those below them.
+  !> What a pressure has to know about a side: its points and those below them.
   type :: surface_t
     type(side_t) :: side
     integer, allocatable :: lines(:, :)       !! the points below each of the side, it included, 0:
@@ -50,7 +50,7 @@ contains
 
   !> N_i = V_i sum_j omega V_j (K_i^-1 + K_j^-1) xi: a homogeneous stress P leaves the force P N_i
   !> on point i. Zero inside; the sum over a surface is its length, directed into the body. It is
-  !> what the operators make of a stress of 1.
+  !> the force of the operators for a stress of 1.
   subroutine surface_vectors(operators, volume, vectors)
     class(operators_t), intent(inout) :: operators
     real(wp),           intent(in),  contiguous :: volume(:)       !! V (n) [m^2]
@@ -77,7 +77,7 @@ contains
     end do
   end subroutine surface_vectors
 
-  !> Pressure on a part of a side, which no point carries yet.
+  !> Pressure on a part of a side, not yet divided among the points.
   pure type(pressure_t) function new_pressure(name, side, value, span, ramp_time) result(pressure)
     character(*), intent(in) :: name, side
     real(wp),     intent(in) :: value         !! at full load [Pa]
@@ -94,8 +94,8 @@ contains
   end function new_pressure
 
   !> Give each point its part of a pressure. Every line of points across the side carries the
-  !> pressure on the part of the side that it owns within the span, by the weights N_i; a common
-  !> factor makes the whole the pressure times the length. No points: nothing to act on.
+  !> pressure on its part of the side within the span, by the weights N_i; a common factor makes
+  !> the sum equal to the pressure times the length. No points: nothing to act on.
   pure subroutine spread_pressure(surface, pressure)
     type(surface_t),  intent(in)    :: surface
     type(pressure_t), intent(inout) :: pressure
@@ -113,7 +113,7 @@ contains
       n = 0
       do k = 1, size(part)
         if (part(k) <= 0.0_wp) cycle
-        ! the other half of a line is the other side's
+        ! the other half of a line belongs to the other side
         do j = 1, min(depth + 1, max(1, length_of(lines(:, k)) / 2))
           if (.not. surface%slides(lines(j, k))) cycle
           n = n + 1
@@ -132,8 +132,8 @@ contains
   !> The length of the side that each of its points stands for within the span, 0 where it does not
   !> slide along the pressure.
   !>
-  !> Where the span reaches an end of the side, and a layer stands there whose points slide, the
-  !> layer is the body going on: it carries the pressure too.
+  !> If the span reaches an end of the side where a layer has points that slide, the layer stands
+  !> for the body going on: it carries the pressure too.
   pure subroutine find_parts(surface, pressure, part)
     type(surface_t),  intent(in)    :: surface
     type(pressure_t), intent(inout) :: pressure

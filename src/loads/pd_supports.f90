@@ -1,4 +1,4 @@
-!> Supports: what holds or moves points of the model, and takes their reactions.
+!> Supports: they fix or move points of the model, and take their reactions.
 !>
 !> The time loop knows only this interface. A new kind is a module with an extension of `support_t`
 !> and a line in `pd_setup_loads`.
@@ -14,7 +14,7 @@ module pd_supports
   !> A set of points with its motion, and the force of the present step.
   type, abstract :: support_t
     character(:), allocatable :: name
-    character(:), allocatable :: load_kind   !! in a word; allocated where a load is part of it
+    character(:), allocatable :: load_kind   !! in a word; allocated if it includes a load
     integer, allocatable :: points(:)
     real(wp) :: force(2) = 0.0_wp            !! that the support applies to the body [N/m]
   contains
@@ -29,14 +29,14 @@ module pd_supports
 
   abstract interface
 
-    !> Put 0 at the components of the points whose motion is prescribed.
+    !> Set `free` to 0 in the prescribed components of the points.
     pure subroutine mark_prescribed(self, free)
       import :: support_t, wp
       class(support_t), intent(in)    :: self
       real(wp),         intent(inout) :: free(:, :)   !! 1: free (n,2)
     end subroutine mark_prescribed
 
-    !> Put the prescribed components where they are at time t.
+    !> Set the prescribed components of u and v at time t.
     pure subroutine prescribe(self, t, u, v)
       import :: support_t, wp
       class(support_t), intent(in)    :: self
@@ -66,7 +66,7 @@ module pd_supports
 
   end interface
 
-  !> A place for a support of any kind.
+  !> Holds a support of any kind.
   type :: support_item_t
     class(support_t), allocatable :: support
   end type support_item_t
@@ -98,9 +98,9 @@ contains
     end do
   end function reaction
 
-  ! --- what most supports do not do
+  ! --- defaults, right for most supports
 
-  !> Change the force density so that points which move as one keep doing so: here none do.
+  !> Change the force density so that points which move as one keep doing so: here there are none.
   pure subroutine share_nothing(self, volume, t, f)
     class(support_t), intent(in)    :: self
     real(wp),         intent(in)    :: volume(:)      !! V (n) [m^2]
@@ -111,8 +111,8 @@ contains
     end associate
   end subroutine share_nothing
 
-  !> Velocity that the support prescribes to component c of all its points alike; without times
-  !> where it prescribes no such velocity.
+  !> Velocity that the support prescribes for component c of all its points; a table without times
+  !> if there is no such velocity.
   pure type(table_t) function no_common_velocity(self, c) result(velocity)
     class(support_t), intent(in) :: self
     integer,          intent(in) :: c
@@ -122,7 +122,7 @@ contains
     if (allocated(velocity%times)) deallocate (velocity%times)
   end function no_common_velocity
 
-  !> What `--check` says of the load on a support; '' where there is none.
+  !> What `--check` says about the load on a support; '' if there is none.
   pure function nothing_to_say(self) result(text)
     class(support_t), intent(in) :: self
     character(:), allocatable :: text
@@ -134,7 +134,7 @@ contains
 
   ! --- all supports, in their order
 
-  !> Put 0 at all prescribed components.
+  !> Set `free` to 0 in all prescribed components.
   pure subroutine mark_all_prescribed(self, free)
     class(supports_t), intent(in)    :: self
     real(wp),          intent(inout) :: free(:, :)    !! 1: free (n,2)
@@ -145,7 +145,7 @@ contains
     end do
   end subroutine mark_all_prescribed
 
-  !> Put the prescribed components where they are at time t.
+  !> Set the prescribed components of u and v at time t.
   pure subroutine prescribe_all(self, t, u, v)
     class(supports_t), intent(in)    :: self
     real(wp),          intent(in)    :: t             !! [s]

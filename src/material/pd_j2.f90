@@ -18,14 +18,14 @@ module pd_j2
   type, extends(elastic_t) :: j2_t
     real(wp) :: kinematic_modulus = 0.0_wp !! H_k
     real(wp) :: isotropic_modulus = 0.0_wp !! H_i
-    real(wp) :: residual_strength = 0.0_wp !! sigma_r; at weaker points sigma_y0 takes its place
+    real(wp) :: residual_strength = 0.0_wp !! sigma_r; at weaker points sigma_y0 instead
   contains
     procedure, nopass :: remembers
     procedure :: stress_block
     procedure :: reduced
   end type j2_t
 
-  real(wp), parameter :: tiny_modulus = 1.0e-30_wp   !! keeps quotients finite that are not used
+  real(wp), parameter :: tiny_modulus = 1.0e-30_wp   !! keeps unused quotients finite
   real(wp), parameter :: far = 1.0e100_wp            !! a plastic increment that no point reaches
   real(wp), parameter :: root_3_2 = sqrt(1.5_wp), root_2_3 = sqrt(2.0_wp / 3.0_wp)
 
@@ -248,7 +248,7 @@ contains
   !>
   !> The trial state of all points comes first; then those that yield are gathered, returned
   !> together, and put back: no loop over points has a branch in it.
-  !> What is dissipated is the work of S on dE^p of this step by the trapezoidal rule.
+  !> The dissipation is the work of S on dE^p of this step by the trapezoidal rule.
   pure subroutine stress_block(self, first, lo, hi, strain, points, flow)
     class(j2_t), intent(in) :: self
     integer,     intent(in) :: first, lo, hi
@@ -262,7 +262,7 @@ contains
     call trial_block(self, [first, lo, hi], strain, points%history, points%strength, trial, &
       excess, largest)
     n = 0
-    if (.not. largest <= 0.0_wp) then   ! most blocks are elastic, and need no look at each row
+    if (.not. largest <= 0.0_wp) then   ! in elastic blocks, which most are, no row is looked at
       do i = lo, hi
         if (excess(i - first + 1) <= 0.0_wp) cycle
         n = n + 1

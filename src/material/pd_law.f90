@@ -16,10 +16,10 @@ module pd_law
   type :: law_points_t
     real(wp), allocatable :: stress(:, :)    !! conjugate to the strain (n,4) xx yy zz xy [Pa]
     real(wp), allocatable :: history(:, :)   !! what the points remember (n, most of any law)
-    real(wp), allocatable :: strength(:)     !! before any flow (n) [Pa]; not of a law without one
+    real(wp), allocatable :: strength(:)     !! before any flow (n) [Pa]; laws without one ignore it
   end type law_points_t
 
-  !> What flowed in some rows of a block in a step.
+  !> The plastic flow in a block in one step.
   type :: flow_t
     integer  :: n = 0                      !! rows that flow
     integer  :: rows(n_block)              !! (n) ascending
@@ -65,7 +65,8 @@ module pd_law
       class(law_t), intent(in)  :: self
       real(wp),     intent(out) :: lambda, shear_modulus   !! [Pa]
     end subroutine moduli_of
-    !> The same law with its strengths divided by a factor. The strength of the points is not its.
+    !> The same law with its strengths divided by a factor. The strength of the points is not part
+    !> of it.
     pure function reduced_of(self, factor) result(law)
       import :: law_t, wp
       class(law_t), intent(in)  :: self

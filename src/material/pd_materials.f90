@@ -1,8 +1,8 @@
-!> The materials of a body: which rows of the fields belong to which, and law and strain measure
-!> applied to a block of rows.
+!> The materials of a body: which rows of the fields belong to which material, and how its law and
+!> strain measure apply to a block of rows.
 !>
-!> A block is divided into runs of rows of one material. Where a body has one material a block is
-!> one run, and its law works on it directly; where materials meet it works on each run in turn.
+!> A block is divided into runs of rows of one material. If a body has one material, a block is
+!> one run; where materials meet, each law works on its own runs.
 !> Source: doc/theory.md, sections 2 and 3.
 module pd_materials
   use pd_blocks, only: blocks_t
@@ -81,8 +81,8 @@ contains
     end do
   end subroutine divide_into_runs
 
-  !> Columns of the history: those of the law that remembers most. Where laws differ, a column of
-  !> another law has another meaning, and the name of both.
+  !> Columns of the history: those of the law that remembers most. Where laws differ, a column
+  !> has a meaning for each law, and carries both names.
   pure function remembered(self) result(columns)
     class(materials_t), intent(in) :: self
     type(label_t), allocatable :: columns(:), more(:)
@@ -110,8 +110,8 @@ contains
     real(wp), intent(in), contiguous :: volume(:)   !! V (n) [m^2]
     real(wp), intent(in), contiguous :: h(:, :)     !! H (n,4) xx xy yx yy
     type(law_points_t), intent(inout) :: points
-    real(wp), intent(inout) :: p(n_block, 4)        !! out: P xx xy yx yy [Pa]; first the strain,
-                                                    !! which spares room in the cache
+    real(wp), intent(inout) :: p(n_block, 4)        !! out: P xx xy yx yy [Pa]; holds the strain
+                                                    !! first, to save room in the cache
     real(wp), intent(out)   :: dissipated
     type(flow_t) :: flow
     integer      :: first, i, k

@@ -1,4 +1,4 @@
-!> A strain measure: the strain of a deformation, and what becomes of the stress conjugate to it.
+!> A strain measure: the strain of a deformation, and P and Cauchy stress from its conjugate stress.
 !>
 !> A measure is a type that extends `measure_t`, in a module of its own. All are written in
 !> H = F - I, so that small strains keep their digits.

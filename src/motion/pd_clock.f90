@@ -23,7 +23,7 @@ contains
     time = real(self%step, wp) * self%time_step
   end function time
 
-  !> Go on by one step.
+  !> Advance by one step.
   pure subroutine advance(self)
     class(clock_t), intent(inout) :: self
 

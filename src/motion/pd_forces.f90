@@ -2,8 +2,7 @@
 !>
 !>   u gives H, H gives strain, stress and P; the operators turn P into f; loads and supports join
 !>
-!> One block of points after the other: what a block has written is in the cache where it is needed
-!> next.
+!> Each kernel finds what the one before it wrote for the same block still in the cache.
 !> Source: doc/theory.md, sections 2 to 5 and 7.
 module pd_forces
   use pd_kinds, only: n_block, wp

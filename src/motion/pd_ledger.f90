@@ -1,7 +1,7 @@
 !> Work and dissipation, added up step by step.
 !>
-!> What the points do is kept per block, and added over the blocks when somebody asks: an ordinary
-!> step takes no sum over all points.
+!> Work at the points is kept per block, and added over the blocks only when it is asked for: an
+!> ordinary step takes no sum over all points.
 !> Source: doc/theory.md, section 10.
 module pd_ledger
   use pd_blocks, only: blocks_t
@@ -13,11 +13,11 @@ module pd_ledger
 
   type :: ledger_t
     real(wp) :: initial_kinetic_energy = 0.0_wp         !! [J/m]
-    real(wp) :: largest_work = 0.0_wp                   !! largest |W| that was asked for [J/m]
+    real(wp) :: largest_work = 0.0_wp                   !! largest |W| that was noted [J/m]
     real(wp) :: outer_work = 0.0_wp                     !! of supports and loads [J/m]
     real(wp), allocatable :: plastic(:)                 !! dissipated by flow (blocks) [J/m]
     real(wp), allocatable :: damping(:)                 !! dissipated by damping (blocks) [J/m]
-    real(wp), allocatable :: frame_work(:)              !! of who moves the damping's frame (blocks)
+    real(wp), allocatable :: frame_work(:)              !! done by the damping's frame (blocks)
   contains
     procedure :: plastic_dissipation
     procedure :: damping_dissipation
@@ -60,7 +60,7 @@ contains
     external_work = self%outer_work + blocks%total(self%frame_work)
   end function external_work
 
-  !> Keep the sums in so many blocks: those of a run with another division go into the first one.
+  !> Fit the sums to a division into blocks: those of another division go into the first block.
   pure subroutine fit(self, blocks)
     class(ledger_t), intent(inout) :: self
     type(blocks_t),  intent(in)    :: blocks
@@ -76,7 +76,7 @@ contains
     self%frame_work = fitting%frame_work
   end subroutine fit
 
-  !> Remember the largest work that was ever done.
+  !> Remember the largest work so far.
   pure subroutine note_work(self, blocks)
     class(ledger_t), intent(inout) :: self
     type(blocks_t),  intent(in)    :: blocks

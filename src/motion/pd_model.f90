@@ -13,7 +13,7 @@ module pd_model
   implicit none
   private
 
-  public :: model_t, frame_t, start, damping_frame
+  public :: model_t, damping_frame_t, start, damping_frame
 
   !> Everything about a run that does not change while it runs, and the supports with the forces of
   !> the present step.
@@ -35,14 +35,14 @@ module pd_model
   end type model_t
 
   !> Velocity against which the damping acts: linear between two ends, constant beyond them.
-  type :: frame_t
+  type :: damping_frame_t
     real(wp) :: lower(2) = 0.0_wp, upper(2) = 0.0_wp   !! [m/s]
-  end type frame_t
+  end type damping_frame_t
 
 contains
 
   !> Velocity at both ends of the frame in which the damping acts, at time t.
-  pure type(frame_t) function damping_frame(model, t) result(frame)
+  pure type(damping_frame_t) function damping_frame(model, t) result(frame)
     type(model_t), intent(in) :: model
     real(wp),      intent(in) :: t   !! [s]
 
@@ -50,12 +50,12 @@ contains
       call reference_ends(model%platens, t, frame%lower, frame%upper)
   end function damping_frame
 
-  !> State at t = 0: undeformed, moving with the frame of the damping, supports with theirs; loads
-  !> without a ramp act already.
+  !> State at t = 0: undeformed, moving with the frame of the damping, supports with their own
+  !> velocity; loads without a ramp act already.
   subroutine start(model, state)
     type(model_t), intent(inout) :: model
     type(state_t), intent(out)   :: state
-    type(frame_t) :: frame
+    type(damping_frame_t) :: frame
     integer :: k
 
     call state%allocate(size(model%points%volume), model%materials%remembered())

@@ -1,4 +1,4 @@
-!> When a run ends and when it shows something, counted in steps of one length.
+!> When a run ends and when its output is due, in steps of constant length.
 !>
 !> Output requests never change the time step: a request is met at the first step at or past it.
 !> Source: doc/input.md, output.

@@ -1,6 +1,6 @@
 !> The state of a run: everything that changes from step to step at the points.
 !>
-!> `visit` is the table of its fields: whatever is done with all of them is a visitor.
+!> `visit` is the table of its fields: everything that is done with all of them is a visitor.
 module pd_state
   use pd_blocks, only: blocks_t
   use pd_fields, only: allocating_t, counting_t, field_visitor_t, gathering_t, scattering_t, &
@@ -29,12 +29,12 @@ module pd_state
     procedure :: numbers_per_point
   end type state_t
 
-  !> What the blocks of points hand back in a step. Added up in the order of the blocks, it has the
-  !> same bits for any number of threads. Made once: nothing is allocated from step to step.
+  !> What the blocks return in a step. Added up in the order of the blocks, it has the same bits
+  !> for any number of threads. Allocated once, not in every step.
   type :: block_work_t
     real(wp), allocatable :: damping(:, :)    !! work of the damping, see `pd_verlet` (4,blocks)
     real(wp), allocatable :: dissipated(:)    !! work of S on dE^p (blocks) [J/m]
-    integer,  allocatable :: failed(:)        !! first point with det F <= 0, 0: none (blocks)
+    integer,  allocatable :: failed(:)        !! first row with det F <= 0, 0: none (blocks)
     real(wp), allocatable :: times(:, :)      !! clock at the ends of kernels (3,blocks) [s]
   contains
     procedure :: fit
@@ -42,7 +42,7 @@ module pd_state
 
 contains
 
-  !> Make room for some blocks.
+  !> Allocate for these blocks, unless that is done.
   subroutine fit(self, blocks)
     class(block_work_t), intent(inout) :: self
     type(blocks_t),      intent(in)    :: blocks
@@ -89,23 +89,23 @@ contains
     call self%visit(room)
   end subroutine allocate_state
 
-  !> Reduce the fields that a restart needs to some rows, in their order, and give up the others.
-  subroutine gather(self, places)
+  !> Reduce the fields that a restart needs to some rows, in their order; deallocate the others.
+  subroutine gather(self, rows)
     class(state_t), intent(inout) :: self
-    integer,        intent(in)    :: places(:)
+    integer,        intent(in)    :: rows(:)
     type(gathering_t) :: choice
 
-    allocate (choice%places, source=places)
+    allocate (choice%rows, source=rows)
     call self%visit(choice)
   end subroutine gather
 
   !> The state of n rows from that of some of them; the others are unloaded and at rest.
-  subroutine scatter(self, places, n)
+  subroutine scatter(self, rows, n)
     class(state_t), intent(inout) :: self
-    integer,        intent(in)    :: places(:), n
+    integer,        intent(in)    :: rows(:), n
     type(scattering_t) :: spread_out
 
-    allocate (spread_out%places, source=places)
+    allocate (spread_out%rows, source=rows)
     spread_out%n = n
     call self%visit(spread_out)
   end subroutine scatter

@@ -15,20 +15,21 @@ module pd_step
 
   public :: step_work_t, take_step
 
-  !> Work space of the steps, and what one of them leaves to the next.
+  !> Work space of the steps, and what one step passes on to the next.
   type :: step_work_t
     type(block_work_t), private :: blocks
     !> v is v^{n+1/2}: the second half kick of the last step comes together with the first one of
-    !> the next, which saves a way through the memory.
+    !> the next, which saves a pass through memory.
     logical, private :: open = .false.
   end type step_work_t
 
 contains
 
-  !> One step, from the time of the clock to the next: the loads join f, and work on v^{n+1/2}.
+  !> One step, from the time of the clock to the next: loads are added to f, and do work on
+  !> v^{n+1/2}.
   !>
-  !> `whole`: the state will be looked at; else v and the ledger may be half a kick behind until
-  !> the next step. That changes no bit of what is seen.
+  !> `whole`: the state will be looked at; otherwise v and the ledger may be half a kick behind
+  !> until the next step. No bit of the output depends on it.
   !> `failed_row`: 0, or the first row whose det F is not positive (NaN included).
   subroutine take_step(clock, whole, model, state, work, ledger, timing, failed_row)
     type(clock_t),     intent(inout) :: clock
@@ -66,7 +67,7 @@ contains
     call timing%lap(kernel_motion)
   end subroutine take_step
 
-  !> Enter the work of the damping in half a step.
+  !> Add the work of the damping in half a step to the ledger.
   pure subroutine enter_damping(work, ledger)
     real(wp),       intent(in)    :: work(:, :)   !! dissipated, done by the frame (2,blocks) [J/m]
     type(ledger_t), intent(inout) :: ledger

@@ -3,11 +3,11 @@
 !>   v^{n+1/2} = v^n + dt/2 (f^n - C (v^n - v_ref)) / rho,   u^{n+1} = u^n + dt v^{n+1/2}
 !>   v^{n+1}   = (v^{n+1/2} + dt/2 (f^{n+1} + C v_ref) / rho) / (1 + dt C / (2 rho))
 !>
-!> Prescribed components are left to the boundaries.
+!> Prescribed components are left to the supports.
 !> Source: doc/theory.md, section 6.
 module pd_verlet
   use pd_kinds, only: block_sum, n_block, wp
-  use pd_model, only: frame_t, model_t
+  use pd_model, only: damping_frame_t, model_t
   use pd_state, only: block_work_t, state_t
   implicit none
   private
@@ -30,18 +30,18 @@ module pd_verlet
 contains
 
   !> Second half kick of a step, first half kick and drift of the next, or both: together they take
-  !> one way through the memory, and give the same bits.
+  !> one pass through memory, and give the same bits.
   !>
   !> `work%damping`, per block, half a step's work of the damping force C (v - v_ref) in the second
   !> half kick: on v - v_ref: dissipated (1), and of the force -C (v - v_ref) on v_ref: done by
   !> whoever moves the frame (2); in the first half kick likewise (3, 4) [J/m].
   subroutine move_points(kicks, model, frame, time_step, state, work)
-    type(kicks_t),      intent(in)    :: kicks
-    type(model_t),      intent(in)    :: model
-    type(frame_t),      intent(in)    :: frame       !! where one step ends and the next begins
-    real(wp),           intent(in)    :: time_step   !! dt [s]
-    type(state_t),      intent(inout) :: state       !! force: read; velocity, displacement: moved
-    type(block_work_t), intent(inout) :: work
+    type(kicks_t),         intent(in)    :: kicks
+    type(model_t),         intent(in)    :: model
+    type(damping_frame_t), intent(in)    :: frame       !! at the time between the two steps
+    real(wp),              intent(in)    :: time_step   !! dt [s]
+    type(state_t),         intent(inout) :: state       !! reads force; moves velocity, displacement
+    type(block_work_t),    intent(inout) :: work
     integer :: block
 
     call work%fit(model%blocks)
@@ -55,13 +55,13 @@ contains
 
   !> The same for one block.
   pure subroutine move_block(block, kicks, model, frame, time_step, state, work)
-    integer,       intent(in)    :: block
-    type(kicks_t), intent(in)    :: kicks
-    type(model_t), intent(in)    :: model
-    type(frame_t), intent(in)    :: frame
-    real(wp),      intent(in)    :: time_step
-    type(state_t), intent(inout) :: state
-    real(wp),      intent(out)   :: work(4)
+    integer,               intent(in)    :: block
+    type(kicks_t),         intent(in)    :: kicks
+    type(model_t),         intent(in)    :: model
+    type(damping_frame_t), intent(in)    :: frame
+    real(wp),              intent(in)    :: time_step
+    type(state_t),         intent(inout) :: state
+    real(wp),              intent(out)   :: work(4)
     type(kick_t) :: kick
     real(wp)     :: part(2)
     integer      :: k

@@ -1,7 +1,7 @@
 !> The operators as a list of bonds, for any points.
 !>
-!> The bonds of a point stand together. Every point gathers its own bonds in a fixed order, so the
-!> result has the same bits for any number of threads.
+!> The bonds of a point are stored together. Every point gathers its own bonds in a fixed order, so
+!> the result has the same bits for any number of threads.
 !> Source: doc/theory.md, sections 2, 4 and 5.
 module pd_bond_list
   use pd_cells, only: cells_t, largest_neighbourhood, sort_into_cells
@@ -38,7 +38,7 @@ contains
 
   !> Find all families and weigh their bonds.
   !>
-  !> Errors: two points in one place; the first few are named with their positions.
+  !> Errors: two points coincide; the first few are reported with their positions.
   subroutine new_bond_list(horizon, position, volume, operators, errors)
     type(horizon_t),    intent(in)    :: horizon
     real(wp),           intent(in)    :: position(:, :)  !! X (n,2) [m]
@@ -79,7 +79,7 @@ contains
     call report_coincident(operators, position, errors)
   end subroutine new_bond_list
 
-  !> Fill the bond list, whose places are already counted.
+  !> Fill the bond list, whose length is known already.
   subroutine weigh_bonds(horizon, cells, position, volume, operators, errors)
     type(horizon_t),   intent(in)    :: horizon
     type(cells_t),     intent(in)    :: cells
@@ -129,7 +129,7 @@ contains
     !$omp end parallel
   end subroutine weigh_bonds
 
-  !> Two points nearer than 1e-9 of the extent of the body stand in one place.
+  !> Report points that coincide: closer than 1e-9 of the extent of the body.
   subroutine report_coincident(operators, position, errors)
     type(bond_list_t),  intent(in)    :: operators
     real(wp),           intent(in)    :: position(:, :)
@@ -151,17 +151,17 @@ contains
         n_found = n_found + 1
         if (n_found > most_reported) cycle
         write (text, '(a,i0,a,i0,a,g0.7,a,g0.7,a)') 'points ', i, ' and ', j, &
-          ' stand in one place, (', position(i, 1), ', ', position(i, 2), ') m'
+          ' coincide at (', position(i, 1), ', ', position(i, 2), ') m'
         call errors%add(trim(text))
       end do
     end do
     if (n_found > most_reported) then
-      write (text, '(i0,a)') n_found - most_reported, ' more pairs of points stand in one place'
+      write (text, '(i0,a)') n_found - most_reported, ' more pairs of points coincide'
       call errors%add(trim(text))
     end if
   end subroutine report_coincident
 
-  !> G[u] of points lo to hi: g = sum_j omega V_j (u_j - u_i) (x) xi.
+  !> G[u] of rows lo to hi: g = sum_j omega V_j (u_j - u_i) (x) xi.
   pure subroutine gradient_sums_block(self, lo, hi, u, g)
     class(bond_list_t), intent(in)  :: self
     integer,  intent(in) :: lo, hi
@@ -192,7 +192,7 @@ contains
     end do
   end subroutine gradient_sums_block
 
-  !> D[A] of points lo to hi: f = sum_j omega V_j (A_i + A_j) xi.
+  !> D[A] of rows lo to hi: f = sum_j omega V_j (A_i + A_j) xi.
   pure subroutine divergence_sums_block(self, lo, hi, a, f)
     class(bond_list_t), intent(in)  :: self
     integer,  intent(in) :: lo, hi
@@ -215,7 +215,7 @@ contains
     end do
   end subroutine divergence_sums_block
 
-  !> f <- f + Z[u] for points lo to hi: the bond part of the zero-energy control.
+  !> f <- f + Z[u] for rows lo to hi: the bond part of the zero-energy control.
   pure subroutine control_sums_block(self, lo, hi, u, f)
     class(bond_list_t), intent(in)    :: self
     integer,  intent(in) :: lo, hi

@@ -2,16 +2,16 @@
 !>
 !>   X[f]_i = sum_j w x f_j     Y[f]_i = sum_j w y f_j     L[f]_i = sum_j w f_j     (x, y) = xi
 !>
-!> are first summed up and down the columns of the family, R_k rows high at k columns aside, and
-!> then across them:
+!> are first summed up and down the columns of the family, which is R_k rows high k columns away,
+!> and then across them:
 !>
 !>   P_k(i) = sum_{|r| <= R_k} w_kr f_{i+r}          X_i = sum_{k>0} x_k (P_k(i+k) - P_k(i-k))
 !>   Q_k(i) = sum_{|r| <= R_k} w_kr y_r f_{i+r}      Y_i = Q_0(i) + sum_{k>0} (Q_k(i+k) + Q_k(i-k))
 !>                                                   L_i = P_0(i) + sum_{k>0} (P_k(i+k) + P_k(i-k))
 !>
-!> L alone counts the point itself too, as a bond of length zero.
+!> Only L includes the point itself, as a bond of length zero.
 !> Where the weights are products, w_kr = g_k g_r (Gaussian and constant influence), columns differ
-!> in their height only and a high one goes on where a lower one ends: the work grows with m, not
+!> only in height, and a high one continues where a lower one ends: the work grows with m, not
 !> with its square. Other weights have sums of their own for every column, about as much work as
 !> bond by bond.
 module pd_columns
@@ -21,9 +21,9 @@ module pd_columns
 
   public :: columns_t, sums_t, new_columns, add_sums
 
-  integer, parameter :: most = 4   !! columns to a pass: their sums stay in registers
-  !> Numbers in all strands that are kept on the stack, up to about m = 30; more are allocated for
-  !> every block.
+  integer, parameter :: most = 4   !! columns per pass: their sums stay in registers
+  !> Strands with at most so many numbers are kept on the stack, up to about m = 30; longer ones are
+  !> allocated for every block.
   integer, parameter :: most_numbers = 8192
 
   !> One of the sums X, Y, L: what is added up and down, and across.
@@ -38,15 +38,15 @@ module pd_columns
     real(wp), allocatable :: weight(:)
   end type sums_t
 
-  !> Strands are sums up and down a column; each begins with row 0, or goes on from another one and
-  !> takes one or two rows more.
+  !> Strands are sums up and down a column; each begins with row 0, or continues another one and
+  !> adds one or two rows.
   type :: columns_t
     integer :: reach = 0                         !! columns on either side
     integer :: n_strands = 0
-    integer,  allocatable :: from(:)             !! strand that this one goes on from; 0: begins
-    integer,  allocatable :: rows(:, :)          !! rows that it takes (2,strands); 0: none
-    integer,  allocatable :: shift(:, :)         !! places from row 0 to these (2,strands)
-    integer :: width = 0                         !! numbers of a strand, which lie side by side
+    integer,  allocatable :: from(:)             !! strand that this one continues; 0: begins
+    integer,  allocatable :: rows(:, :)          !! rows that it adds (2,strands); 0: none
+    integer,  allocatable :: shift(:, :)         !! from row 0 to these, in the field (2,strands)
+    integer :: width = 0                         !! numbers in a strand, one after the other
     type(sums_t) :: x, y, l
   end type columns_t
 
@@ -56,7 +56,7 @@ contains
   pure type(columns_t) function new_columns(weight, spacing, stride) result(columns)
     real(wp), intent(in) :: weight(0:, 0:)   !! w of (k,r), 0 beyond the horizon; (0,0) counts too
     real(wp), intent(in) :: spacing          !! dx [m]
-    integer,  intent(in) :: stride           !! places from a row to the next
+    integer,  intent(in) :: stride           !! from a row to the next, in the field
     integer  :: height(0:ubound(weight, 1)), strand(0:ubound(weight, 1)), k, r, enough
     logical  :: product_form
     real(wp) :: along(0:ubound(weight, 1)), across(0:ubound(weight, 1))
@@ -74,7 +74,7 @@ contains
     across = 1.0_wp
     if (product_form) across = weight(:, 0) / weight(0, 0)
     along = weight(0, :)
-    do r = 0, columns%reach   ! low columns first: higher ones go on from them
+    do r = 0, columns%reach   ! low columns first: higher ones continue them
       do k = columns%reach, 0, -1
         if (height(k) /= r .or. .not. weight(k, 0) > 0.0_wp) cycle
         if (.not. product_form) along = weight(k, :)
@@ -107,7 +107,7 @@ contains
     end do
   end function is_product
 
-  !> Strands up to a row: going on from the last one where `go_on` and there is one, else beginning
+  !> Add a strand up to a row: it continues the last one if `go_on` and there is one, else it begins
   !> with row 0.
   pure subroutine add_strands(along, top, spacing, stride, go_on, columns)
     real(wp),        intent(in)    :: along(0:)   !! weights of the rows
@@ -137,7 +137,7 @@ contains
     end associate
   end subroutine add_strands
 
-  !> Where the columns of a sum are among the strands, and how many are taken in each pass.
+  !> Which strands the columns of a sum are, and how many columns each pass takes.
   pure subroutine list_columns(strand, weight, columns, sums)
     integer,         intent(in)    :: strand(0:)   !! of column k; 0: the sum does not have it
     real(wp),        intent(in)    :: weight(0:)   !! of column k; 0: it does not matter
@@ -154,7 +154,7 @@ contains
       sums%parts = [sums%parts, part]
       n = n - part
     end do
-    ! what fills up the last pass has no weight, but must be a number: that of column 0
+    ! the last pass is filled up without weight, with what must be numbers: those of column 0
     n = sum(sums%parts)
     allocate (sums%plus(n), sums%minus(n), source=columns%reach)
     allocate (sums%weight(n), source=0.0_wp)
@@ -170,13 +170,13 @@ contains
     end do
   end subroutine list_columns
 
-  !> total <- total + X[f], Y[f] or L[f] for points lo to hi.
+  !> total <- total + X[f], Y[f] or L[f] for rows lo to hi.
   pure subroutine add_sums(columns, sums, lo, hi, f, total)
     type(columns_t), intent(in) :: columns
     type(sums_t),    intent(in) :: sums                     !! columns%x, y or l
     integer,         intent(in) :: lo, hi
     real(wp),        intent(in),    contiguous :: f(:)      !! (n)
-    real(wp),        intent(inout), contiguous :: total(:)  !! (hi-lo+1); row 1 is point lo
+    real(wp),        intent(inout), contiguous :: total(:)  !! (hi-lo+1); row 1 is row lo
     real(wp) :: strands(most_numbers)
     real(wp), allocatable :: many(:)
 
@@ -190,7 +190,7 @@ contains
     end if
   end subroutine add_sums
 
-  !> All strands at points lo to hi and as far to either side as the family goes.
+  !> All strands of rows lo to hi, and as far to either side as the family reaches.
   pure subroutine sum_strands(columns, sums, lo, hi, f, strands)
     type(columns_t), intent(in) :: columns
     type(sums_t),    intent(in) :: sums

@@ -1,8 +1,8 @@
 !> Rows of a field that families read and that another rank owns.
 !>
-!> Serial form: what would be a message is a copy from row to row, and a rank that owns all rows has
-!> none to make. The operators bring every field up to date once it is whole, and before a family
-!> reads it, so that a form with messages can take this place.
+!> Serial form: what would be a message is a copy from row to row, and a rank that owns all rows
+!> makes none. The operators bring every field up to date once it is whole, and before a family
+!> reads it, so that a form with messages can replace this one.
 module pd_halo
   use pd_kinds, only: wp
   implicit none

@@ -1,7 +1,7 @@
 !> The operators of a body on a lattice: all points share one set of offsets and weights.
 !>
-!> Places of a box of rows, voids among them, are numbered along the rows, so that the bond to the
-!> place kx columns and ky rows away is a shift by kx + ky * stride. All sums go by columns
+!> The rows of the fields are the places of a box, voids among them, line by line, so that the bond
+!> to the place kx columns and ky lines away is a shift by kx + ky * stride. All sums go by columns
 !> (`pd_columns`):
 !>
 !>   G[u]_i = sum_j omega V_0 u~_j (x) xi - u_i (x) s_i
@@ -9,8 +9,8 @@
 !>   Z[u]_i = c_i sum_j omega V_0 u~_j + sum_j omega V_0 c_j u~_j - u_i sum_j omega V_j (c_i + c_j)
 !>
 !> with u~ = u V / V_0, V_0 = dx^2 (the fields as weighed), and s_i = sum_j omega V_j xi, which
-!> differs from zero only where points are missing or own less than a whole cell. No test in the
-!> inner loops: voids carry zero.
+!> differs from zero only where points are missing or have less than a whole cell. The inner loops
+!> need no test: voids hold zero.
 !> Source: doc/theory.md, sections 2, 4 and 5.
 module pd_lattice
   use pd_blocks, only: blocks_t
@@ -105,11 +105,11 @@ contains
     end if
   end subroutine new_lattice_operators
 
-  !> First place in the line of the cache that holds a place: blocks begin there.
-  pure integer function line_start(place)
-    integer, intent(in) :: place
+  !> First row in the cache line of a row: blocks begin there.
+  pure integer function line_start(row)
+    integer, intent(in) :: row
 
-    line_start = n_line * ((place - 1) / n_line) + 1
+    line_start = n_line * ((row - 1) / n_line) + 1
   end function line_start
 
   !> The columns of the family of an inner point.
@@ -157,7 +157,7 @@ contains
     operators%poorest = poorest(minloc(fewest, dim=1))
   end subroutine weigh
 
-  !> The same for places lo to hi.
+  !> The same for rows lo to hi.
   subroutine count_block(operators, lo, hi, fewest, poorest, n_bonds)
     type(lattice_operators_t), intent(inout) :: operators
     integer,     intent(in)  :: lo, hi
@@ -196,7 +196,7 @@ contains
     end associate
   end subroutine count_block
 
-  !> G[u] of places lo to hi: g = sum_j omega V_j (u_j - u_i) (x) xi.
+  !> G[u] of rows lo to hi: g = sum_j omega V_j (u_j - u_i) (x) xi.
   pure subroutine gradient_sums_block(self, lo, hi, u, g)
     class(lattice_operators_t), intent(in) :: self
     integer,  intent(in) :: lo, hi
@@ -232,7 +232,7 @@ contains
     end do
   end subroutine gradient_of_shares
 
-  !> D[A] of places lo to hi: f = sum_j omega V_j (A_i + A_j) xi.
+  !> D[A] of rows lo to hi: f = sum_j omega V_j (A_i + A_j) xi.
   pure subroutine divergence_sums_block(self, lo, hi, a, f)
     class(lattice_operators_t), intent(in) :: self
     integer,  intent(in) :: lo, hi
@@ -251,7 +251,7 @@ contains
     end do
   end subroutine divergence_sums_block
 
-  !> f = A s for places lo to hi.
+  !> f = A s for rows lo to hi.
   pure subroutine add_own_part(lo, hi, moment, a, f)
     integer,  intent(in) :: lo, hi
     real(wp), intent(in),    contiguous :: moment(:, :)   !! (n,2)
@@ -266,7 +266,7 @@ contains
     end do
   end subroutine add_own_part
 
-  !> Stiffness of the control, and what it takes of it whatever u is:
+  !> Stiffness of the control, and the factor of u_i in Z:
   !> k = c L[share] + L[c share], L by columns, with the point itself.
   subroutine set_control(self, c)
     class(lattice_operators_t), intent(inout) :: self
@@ -289,7 +289,7 @@ contains
     !$omp end parallel do
   end subroutine set_control
 
-  !> f <- f + Z[u] for places lo to hi: Z_i = c_i L[u~]_i + L[c u~]_i - k_i u_i. Each L contains
+  !> f <- f + Z[u] for rows lo to hi: Z_i = c_i L[u~]_i + L[c u~]_i - k_i u_i. Each L contains
   !> the point itself; these terms cancel.
   pure subroutine control_sums_block(self, lo, hi, u, f)
     class(lattice_operators_t), intent(in) :: self
@@ -377,7 +377,7 @@ contains
     !$omp end parallel do
   end subroutine zero_energy_squared
 
-  !> The same for places lo to hi.
+  !> The same for rows lo to hi.
   pure subroutine zero_energy_block(self, lo, hi, u, h, z2)
     class(lattice_operators_t), intent(in) :: self
     integer,  intent(in) :: lo, hi

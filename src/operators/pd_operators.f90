@@ -1,4 +1,4 @@
-!> The consistent gradient over families and its adjoint, with everything that they need inside.
+!> The consistent gradient over families and its adjoint; everything that they need is inside.
 !>
 !>   H_i = G[u]_i K_i^-1               G[u]_i = sum_j omega V_j (u_j - u_i) (x) xi
 !>   f_i = D[A]_i + Z[u]_i             D[A]_i = sum_j omega V_j (A_i + A_j) xi
@@ -10,15 +10,16 @@
 !>
 !> In this order, once per state of u:
 !>
-!>   take_in(u)                          u can be read by the sums
+!>   take_in(u)                          the sums can read u
 !>   gradient_block(lo, hi, u, h)        for every block
 !>   hand_over_block(lo, hi, h, p)       for every block; takes P, keeps A
-!>   share()                             A can be read by the sums
+!>   share()                             the sums can read A
 !>   force_block(lo, hi, u, f)           for every block
 !>
 !> Two realisations: `pd_bond_list` for any points, `pd_lattice` for bodies on a lattice. Set-up
-!> chooses; nobody else knows which it is. A realisation provides the sums G, D and Z. Where its
-!> weights do not know what the neighbour owns, that share belongs to the fields that are summed.
+!> chooses; nothing else knows which it is. A realisation provides the sums G, D and Z. Where its
+!> weights leave out the volume of the neighbour, the fields are multiplied by its share of a whole
+!> cell before they are summed.
 !> Source: doc/theory.md, sections 2, 4 and 5.
 module pd_operators
   use pd_blocks, only: blocks_t
@@ -39,7 +40,7 @@ module pd_operators
     real(wp), allocatable :: k_inverse(:, :)              !! K^-1 (n,3) xx yy xy [1/m^4]
     real(wp), allocatable :: control(:)                   !! c (n) [N/m^6]; not allocated: none
     real(wp), allocatable, private :: force_tensor(:, :)  !! A (n,4), weighed [N/m^6]
-    logical :: weighs = .false.                           !! the sums read weighed fields
+    logical :: weighs = .false.                           !! the sums read fields times the share
     real(wp), allocatable :: share_of(:)                  !! V over that of a whole cell (n)
     real(wp), allocatable :: weighed(:, :)                !! share u (n,2) [m]
     real(wp), allocatable :: pull(:, :)                   !! share c u, which Z reads (n,2) [N/m^5]
@@ -134,7 +135,7 @@ contains
       allocate (self%force_tensor(self%n, 4), source=0.0_wp)   ! rows without a point stay zero
   end subroutine take_in
 
-  !> Keep u weighed with what the points own and, for Z, with the stiffness of the control.
+  !> Keep u times the share of the points and, for Z, times the stiffness of the control.
   subroutine weigh_in(self, u)
     class(operators_t), intent(inout) :: self
     real(wp), intent(in), contiguous :: u(:, :)   !! (n,2) [m]
@@ -161,7 +162,7 @@ contains
     end if
   end subroutine weigh_in
 
-  !> A <- A weighed with what the points own, for rows lo to hi.
+  !> A <- A times the share of the points, for rows lo to hi.
   pure subroutine weigh_block(self, lo, hi, a)
     class(operators_t), intent(in) :: self
     integer,  intent(in) :: lo, hi
@@ -210,7 +211,8 @@ contains
 
   !> Take the first Piola stress of rows lo to hi, and keep A = P K^-1 - c H.
   !>
-  !> A control that follows the material gets here, per block, what the law tells of its flow.
+  !> This is where a control that follows the material gets, per block, what the law says of its
+  !> flow.
   pure subroutine hand_over_block(self, lo, hi, h, p)
     class(operators_t), intent(inout) :: self
     integer,  intent(in) :: lo, hi
@@ -295,12 +297,12 @@ contains
   end subroutine set_control
 
   !> Energy of the control: with constant c it has a potential, (1/2) sum V c sum omega V_j |z|^2,
-  !> which is the work of the control forces without the error of adding it up. The force is linear
-  !> in u, so this is half of the force times u:
+  !> which is the work of the control forces without the round-off of adding it up step by step. The
+  !> force is linear in u, so this is half of the force times u:
   !>
   !>   -(1/2) sum_i V_i (u_i - u_mean) . Z[u]_i - (1/2) sum_i V_i c_i H_i : H_i K_i
   !>
-  !> The mean adds nothing, for the forces are in balance; without it digits of u would be lost.
+  !> The mean adds nothing, because the forces are in balance; with u alone digits would be lost.
   subroutine control_energy(self, volume, u, h, energy)
     class(operators_t), intent(in) :: self
     real(wp), intent(in), contiguous :: volume(:)   !! V (n) [m^2]

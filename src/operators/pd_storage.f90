@@ -1,8 +1,8 @@
-!> Where the points of a body stand in the fields.
+!> Which rows of the fields belong to the points of a body.
 !>
-!> Points are numbered 1 to n for everybody. Fields have rows: one per point where bonds are listed;
-!> on a lattice also one for every place of the box that holds no point, so that the bond to a
-!> neighbour is a shift, the same for all. Kernels go over rows, and what is asked of points is
+!> Everywhere else points are numbered 1 to n. Fields have rows: one per point where bonds are
+!> listed; on a lattice also one for every place of the box that holds no point, so that the bond to
+!> a neighbour is a shift, the same for all. Kernels loop over rows; numbers of points are
 !> translated here.
 module pd_storage
   use pd_families, only: horizon_t
@@ -15,7 +15,7 @@ module pd_storage
   type :: storage_t
     integer :: n = 0                       !! points
     integer :: rows = 0                    !! of every field
-    integer :: stride = 0                  !! rows from a row of the lattice to the next; 0: a list
+    integer :: stride = 0                  !! rows from a line of the lattice to the next; 0: a list
     integer, allocatable :: row(:)         !! of every point, ascending (n)
   contains
     procedure, private :: spread_values
@@ -38,8 +38,8 @@ contains
     storage%row = [(i, i=1, n)]
   end function listed_storage
 
-  !> Rows for the box of places around the points of a lattice, row by row, with a margin, so that a
-  !> shift by a horizon never leaves the fields.
+  !> Rows for the box of places around the points of a lattice, line by line, with a margin, so that
+  !> a shift by a horizon never leaves the fields.
   pure type(storage_t) function lattice_storage(horizon, spacing, place) result(storage)
     type(horizon_t), intent(in) :: horizon
     real(wp),        intent(in) :: spacing       !! dx [m]
@@ -58,11 +58,11 @@ contains
       + storage%stride * (place(:, 2) - low(2) + reach)
   end function lattice_storage
 
-  !> Places in as many whole lines of the cache as hold a number of them.
-  pure integer function whole_lines(count) result(places)
+  !> Rows in as many whole cache lines as hold a number of them.
+  pure integer function whole_lines(count) result(rows)
     integer, intent(in) :: count
 
-    places = n_line * ((count + n_line - 1) / n_line)
+    rows = n_line * ((count + n_line - 1) / n_line)
   end function whole_lines
 
   !> A field of the points, in rows; 0 in the others.

@@ -1,9 +1,9 @@
-!> Checkpoints `<stem>_checkpoint.h5`: all that a run needs to go on, and the one before it.
+!> Checkpoints `<stem>_checkpoint.h5`: everything that a run needs to go on.
 !>
-!> A checkpoint is written under another name, brought to the disk, read back, and only then put in
-!> place, the one before it becoming `<stem>_checkpoint_previous.h5`: at every moment one of them
-!> is whole. A sum over all bytes of the file stands in its first 512 bytes, which HDF5 leaves
-!> to the user; it is checked before HDF5 sees the file.
+!> A checkpoint is written under another name, synced to the disk, read back, and only then renamed;
+!> the one before it becomes `<stem>_checkpoint_previous.h5`. One of them is whole at any moment. A
+!> sum over all bytes of the file stands in its first 512 bytes, which HDF5 leaves to the user; it
+!> is checked before HDF5 sees the file.
 module pd_checkpoint
   use, intrinsic :: iso_fortran_env, only: int8, int32
   use pd_clock, only: clock_t
@@ -20,7 +20,7 @@ module pd_checkpoint
 
   public :: checkpoint_t, write_checkpoint, read_checkpoint, checkpoint_exists, remove_checkpoints
 
-  !> What a run needs beside its state.
+  !> What a run needs apart from its state.
   type :: checkpoint_t
     type(clock_t) :: clock
     integer  :: history_rows = 0        !! written so far
@@ -111,19 +111,19 @@ contains
       ignored = remove_file(temporary)
       return
     end if
-    ! a damaged one must not push out the whole one before it
+    ! a damaged one must not replace the whole one before it
     if (is_whole(newest(stem))) ignored = rename_file(newest(stem), previous(stem))
     call replace_file(temporary, newest(stem), errors)
   end subroutine write_checkpoint
 
   !> Read the newest checkpoint that is whole.
   !>
-  !> `warning`: what the user should know where that is the previous one, otherwise ''.
+  !> `warning`: that it is the previous one; otherwise ''.
   !> Errors: there is none, or none is whole.
   subroutine read_checkpoint(stem, checkpoint, state, warning, errors)
     character(*),              intent(in)    :: stem
     type(checkpoint_t),        intent(out)   :: checkpoint
-    class(state_t),            intent(inout) :: state   !! fields that are not kept stay
+    class(state_t),            intent(inout) :: state   !! fields that are not in a checkpoint stay
     character(:), allocatable, intent(out)   :: warning
     type(error_list_t),        intent(inout) :: errors
 

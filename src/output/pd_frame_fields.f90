@@ -1,7 +1,7 @@
 !> The fields of a frame, in their order: what each is, in words and in numbers.
 !>
-!> This is the only list of them. Places in the result file, writing, taking over on a restart and
-!> the XDMF file loop over it; one more field is a procedure and a call here.
+!> This is the only list of them. Creating and writing datasets, copying them on a restart and the
+!> XDMF file loop over it; one more field is a procedure and a call here.
 !> Source: doc/theory.md, section 10.
 module pd_frame_fields
   use pd_kinds, only: n_block, wp
@@ -18,13 +18,13 @@ module pd_frame_fields
   type :: points_view_t
     type(model_t), pointer :: model => null()
     type(state_t), pointer :: state => null()
-    integer :: column = 0   !! that the field is about
+    integer :: column = 0   !! of the history that the field shows
   end type points_view_t
 
   !> A field over the points.
   type, extends(field_label_t) :: frame_field_t
     procedure(field_of_points), pointer, nopass :: values => null()
-    integer :: column = 0   !! that it is about, if it is: fields that one procedure serves
+    integer :: column = 0   !! of the history, for fields that share one procedure
   end type frame_field_t
 
   abstract interface
@@ -151,7 +151,7 @@ contains
     !$omp end parallel do
   end subroutine take
 
-  !> The values at the points of what comes block by block.
+  !> The values at the points of a field that is computed block by block.
   subroutine take_blocks(view, of_block, values)
     type(points_view_t), intent(in)  :: view
     procedure(numbers_of_block) :: of_block
@@ -173,7 +173,7 @@ contains
     call take(view%model, rows, values)
   end subroutine take_blocks
 
-  !> Cauchy stress; a point that has failed (det F <= 0) has none: 0.
+  !> Cauchy stress; 0 at a point that has failed (det F <= 0).
   pure subroutine cauchy_of_block(view, block, numbers)
     type(points_view_t), intent(in)    :: view
     integer,             intent(in)    :: block

@@ -24,7 +24,7 @@ contains
     write (name, '("/frames/", i6.6)') index
   end function frame_name
 
-  !> Create a frame that is not written yet, and take its space on the disk.
+  !> Create a frame without data, and allocate its space on the disk.
   subroutine reserve_frame(file, group, n, fields, errors)
     type(hdf5_file_t),   intent(inout) :: file
     character(*),        intent(in)    :: group
@@ -81,8 +81,8 @@ contains
     call write_attribute(file, name, 'description', trim(label%description), errors)
   end subroutine write_label
 
-  !> Write the data of a frame and hand them to the operating system. One field after the other: a
-  !> large body has no room for all of them at once.
+  !> Write the data of a frame and hand them to the operating system. One field after the other:
+  !> all of them at once would take too much memory with a large body.
   subroutine put_frame(file, group, fields, model, state, errors)
     type(hdf5_file_t),   intent(inout) :: file
     character(*),        intent(in)    :: group
@@ -102,7 +102,7 @@ contains
     call flush_file(file, errors)
   end subroutine put_frame
 
-  !> Say that a frame is there. Its data must have been flushed before.
+  !> Mark a frame as written. Its data must have been flushed before.
   subroutine mark_frame(file, group, moment, valid, errors)
     type(hdf5_file_t),  intent(inout) :: file
     character(*),       intent(in)    :: group

@@ -1,4 +1,4 @@
-!> Datasets of HDF5 files, and all else that a writer or reader of such files needs.
+!> Datasets of HDF5 files, and everything else that a writer or reader of such files needs.
 !>
 !> Arrays are (n,k) in memory and (n,k) to every reader that counts like C (h5py, ParaView): HDF5
 !> hands dimensions over reversed, so arrays of rank 2 are transposed on the way.
@@ -26,12 +26,12 @@ module pd_hdf5
   public :: read_dataset, read_rows
   public :: write_attribute, read_attribute
 
-  !> Put an array into the file as a new dataset.
+  !> Write an array into the file as a new dataset.
   interface write_dataset
     module procedure write_real_1, write_real_2, write_integer_1, write_text, write_texts
   end interface write_dataset
 
-  !> Write the values of a dataset that is there with this shape; nothing else of it changes.
+  !> Overwrite the values of an existing dataset of this shape; nothing else of it changes.
   interface overwrite_dataset
     module procedure overwrite_real_1, overwrite_real_2
   end interface overwrite_dataset
@@ -44,7 +44,7 @@ module pd_hdf5
 contains
 
   !> Create a real dataset of this shape and fill it with zeros, so that its space on the disk is
-  !> taken now: later writes change bytes in place and nothing else.
+  !> allocated now: later writes only change bytes in place.
   subroutine reserve_dataset(file, name, shape_seen, errors)
     type(hdf5_file_t),  intent(inout) :: file
     character(*),       intent(in)    :: name
@@ -173,8 +173,8 @@ contains
     call put_data(file, name, h5t_native_double, c_loc(buffer), errors)
   end subroutine overwrite_real_2
 
-  !> Write into a dataset that is there, from an array that lies in memory as in the file: all
-  !> components of a point together.
+  !> Write into an existing dataset, from an array with the layout of the file: all components of a
+  !> point together.
   !>
   !> Errors: another shape, a file that cannot be written.
   subroutine overwrite_rows(file, name, values, errors)
@@ -357,8 +357,8 @@ contains
     allocate (values, source=transpose(buffer))
   end subroutine read_real_2
 
-  !> Read a dataset of a known shape into an array that lies in memory as in the file, the other
-  !> way round than `overwrite_rows`.
+  !> Read a dataset of a known shape into an array with the layout of the file: the reverse of
+  !> `overwrite_rows`.
   !>
   !> Errors: another shape, a file that cannot be read.
   subroutine read_rows(file, name, values, errors)

@@ -13,7 +13,7 @@ module pd_hdf5_attributes
 
   public :: write_attribute, read_attribute
 
-  !> Set an attribute of an object: in place where it is there already.
+  !> Set an attribute of an object, in place if it exists already.
   interface write_attribute
     module procedure write_attribute_integer, write_attribute_real, write_attribute_reals, &
       write_attribute_text

@@ -1,4 +1,4 @@
-!> HDF5 files: opening, closing, groups, and what happens when the library says no.
+!> HDF5 files: opening, closing, groups, and what happens when a call of the library fails.
 !>
 !> Together with `pd_hdf5` and `pd_hdf5_attributes` the one place where return codes of
 !> HDF5 are checked. After the first failure a file does nothing more and reports nothing more: a
@@ -67,7 +67,7 @@ contains
     is_good = self%id >= 0 .and. .not. self%failed
   end function is_good
 
-  !> Start the library unless it runs already. It keeps its own global state, so it is asked.
+  !> Start the library unless it is running. It has a global state of its own, so it is asked.
   subroutine start_library(status)
     integer, intent(out) :: status
     logical        :: running

@@ -1,4 +1,4 @@
-!> The history `<stem>_history.csv`: one row of numbers now and then during a run.
+!> The history `<stem>_history.csv`: rows of numbers, written during a run.
 !>
 !> Numbers have 17 significant digits, so a row read back is exact. Every row is handed to the
 !> operating system at once: a kill loses at most the row being written. A restart cuts the file

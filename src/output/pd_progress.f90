@@ -1,4 +1,4 @@
-!> What a run says while it goes: on the screen, and in plain lines in `<stem>.log`.
+!> Progress of a run: on the screen, and in plain lines in `<stem>.log`.
 !>
 !> On a terminal one line is rewritten several times a second; elsewhere, and in the log, a line is
 !> added at every tenth of the run and at the latest after ten seconds (log: a minute where the
@@ -22,7 +22,7 @@ module pd_progress
   character(*), parameter :: carriage_return = achar(13), escape = achar(27)
   character(*), parameter :: clear_rest = escape//'[K'
 
-  !> Where a run stands.
+  !> How far a run has come.
   type :: status_t
     integer  :: step = 0, steps = 0          !! steps done, steps of the whole run
     real(wp) :: time = 0.0_wp                !! [s]
@@ -39,7 +39,7 @@ module pd_progress
     logical  :: on_screen = .false.          !! whether the screen is written to
     logical  :: terminal = .false.           !! whether a line is rewritten there
     logical  :: line_shown = .false.         !! whether such a line stands there
-    integer  :: tenths = 0                   !! tenths of the run that have had their line
+    integer  :: tenths = 0                   !! tenths of the run that have been reported
     real(wp) :: last_rewrite = 0.0_wp, last_line = 0.0_wp   !! wall clock [s]
     integer  :: last_step = -1               !! the step and wall clock of the last rate
     real(wp) :: last_clock = 0.0_wp
@@ -92,7 +92,7 @@ contains
     end if
   end function progress_due
 
-  !> Show where the run stands: rewrite the line on a terminal, add a line elsewhere where one is
+  !> Show the progress of the run: rewrite the line on a terminal; elsewhere add a line if one is
   !> due.
   !>
   !> Errors: the log cannot be written to; reported once.
@@ -278,7 +278,7 @@ contains
     if (status /= 0) progress%on_screen = .false.
   end subroutine put_on_screen
 
-  !> Write over the line; what does not fit is cut off at the edge of the screen.
+  !> Overwrite the line; it is cut off at the edge of the screen.
   subroutine rewrite_line(progress, line)
     type(progress_t), intent(inout) :: progress
     character(*),     intent(in)    :: line
@@ -289,7 +289,7 @@ contains
     progress%line_shown = .true.
   end subroutine rewrite_line
 
-  !> Take the line that is being rewritten off the screen.
+  !> Erase the line that is being rewritten.
   subroutine clear_line(progress)
     type(progress_t), intent(inout) :: progress
 

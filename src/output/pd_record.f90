@@ -56,7 +56,7 @@ contains
     if (.not. results_in_the_way) results_in_the_way = checkpoint_exists(stem)
   end function results_in_the_way
 
-  !> Open all outputs: anew, or behind a checkpoint (rows in the history).
+  !> Open all outputs: new ones, or those of a checkpoint (with rows in the history).
   !>
   !> Errors: a file cannot be written; on a restart, results that do not fit the checkpoint.
   subroutine open_record(input, provenance, model, schedule, checkpoint, quiet, record, errors)
@@ -100,7 +100,7 @@ contains
       call open_progress(record%progress, record%stem, restart, quiet, errors)
   end subroutine open_record
 
-  !> Everything that the result file says beside its frames.
+  !> Everything in the result file except frames and rows.
   subroutine describe_run(input, provenance, model, schedule, description)
     type(input_t),      intent(in) :: input
     type(provenance_t), intent(in) :: provenance
@@ -188,7 +188,7 @@ contains
       state, errors)
   end subroutine record_failure
 
-  !> Show where the run stands; axial stress and largest alpha are those of the last row.
+  !> Show the progress of the run; axial stress and largest alpha are those of the last row.
   subroutine record_progress(model, state, schedule, clock, record, errors)
     type(model_t),      intent(in)    :: model
     type(state_t),      intent(in)    :: state

@@ -1,10 +1,9 @@
-!> The result file `<stem>.h5` and its `<stem>.xdmf`: points, frames, history, and where they come
-!> from.
+!> The result file `<stem>.h5` and its `<stem>.xdmf`: points, frames, history, and their provenance.
 !>
-!> All frames and rows are created, and their space on the disk is taken, before the file gets its
-!> name. From then on its structure never changes: a frame is data written in place and handed to
-!> the operating system, then its attributes in one write, `written` among them; rows of the history
-!> likewise. A kill at any moment loses at most what is being written.
+!> All frames and rows are created, and their space on the disk is allocated, before the file gets
+!> its name. From then on its structure never changes: a frame is data written in place and handed
+!> to the operating system, then its attributes in one write, `written` among them; rows of the
+!> history likewise. A kill at any moment loses at most what is being written.
 module pd_result
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   use pd_errors, only: error_list_t
@@ -28,20 +27,20 @@ module pd_result
   public :: create_result, resume_result, add_row, write_rows, write_frame, write_failed_frame
   public :: finish_result, result_exists
 
-  !> How much there is in a result file, or will be.
+  !> Numbers of frames and rows for which a result file has space.
   type :: places_t
     integer :: frames = 0   !! 000000 among them
     integer :: rows = 0     !! of the history, that of the unloaded state among them
   end type places_t
 
-  !> Rows that wait for being written together.
+  !> Rows that are written together.
   integer, parameter :: bunch = 100
 
   !> A result file of a run that is going on; the file itself is closed between calls.
   type :: result_t
     character(:), allocatable :: path, xdmf_path
     integer :: n = 0                   !! points
-    type(places_t) :: places           !! that there are in the file
+    type(places_t) :: places           !! in the file
     type(frame_field_t), allocatable :: fields(:)
     type(column_t),      allocatable :: columns(:)
     logical :: has_strain = .false.    !! whether there are platens
@@ -49,8 +48,8 @@ module pd_result
     integer :: written = 0             !! frames written so far
     character(:), allocatable :: grids !! of these frames, for the XDMF file
     integer :: rows_written = 0
-    integer,  private :: waiting = 0                   !! rows
-    real(wp), allocatable, private :: bunch_of(:, :)   !! them (columns,rows)
+    integer,  private :: waiting = 0                   !! rows not written yet
+    real(wp), allocatable, private :: bunch_of(:, :)   !! these rows (columns,rows)
   end type result_t
 
 contains
@@ -63,7 +62,7 @@ contains
       file_exists(stem//'_checkpoint.h5'), file_exists(stem//'_checkpoint_previous.h5')])
   end function result_exists
 
-  !> Create the result file with places for frames and rows, replacing one of that name.
+  !> Create the result file with space for frames and rows, replacing one of that name.
   !>
   !> Errors: the files cannot be written; an older result file is then as it was.
   subroutine create_result(result, stem, description, places, errors)
@@ -80,7 +79,7 @@ contains
   end subroutine create_result
 
   !> Go on with the result file of a run that was cut off: a new file with the first frames and rows
-  !> of the old one and places for more takes its place.
+  !> of the old one and space for more replaces it.
   !>
   !> Errors: no such file, another set of points, other columns, fewer frames or rows than the
   !> checkpoint knows of, or the files cannot be written. The old file is then as it was.
@@ -122,7 +121,7 @@ contains
   !> Take in a row of the history. It waits for others, and is written with the next frame at the
   !> latest.
   !>
-  !> Errors: there is no place for it, or the file cannot be written.
+  !> Errors: there is no space for it, or the file cannot be written.
   subroutine add_row(result, values, errors)
     type(result_t),     intent(inout) :: result
     real(wp),           intent(in)    :: values(:)   !! in the order of the columns

@@ -1,8 +1,8 @@
 !> The history in a result file: /history/<column>, one dataset per column.
 !>
-!> All rows have their place when the file is made, and are filled in bunches: data written in place
-!> and handed to the operating system, then `written`, the number of rows that are good. A kill at
-!> any moment costs the rows of the last bunch and no others.
+!> Space for all rows is allocated with the file. They are filled in bunches: first the data, which
+!> are handed to the operating system, then `written`, the number of valid rows. A kill at any
+!> moment loses at most the rows of the last bunch.
 module pd_rows
   use pd_errors, only: error_list_t
   use pd_frames, only: write_label
@@ -20,7 +20,7 @@ module pd_rows
 
 contains
 
-  !> Create the history without rows, and take the space of n of them on the disk.
+  !> Create the history without rows, and allocate the space of n rows on the disk.
   subroutine reserve_rows(file, columns, n, errors)
     type(hdf5_file_t),  intent(inout) :: file
     type(column_t),     intent(in)    :: columns(:)
@@ -42,7 +42,7 @@ contains
     end do
   end subroutine reserve_rows
 
-  !> Write rows behind the first `written` ones, and say that they are there.
+  !> Write rows after the first `written` ones, and count them as written.
   subroutine put_rows(file, columns, written, values, errors)
     type(hdf5_file_t),  intent(inout) :: file
     type(column_t),     intent(in)    :: columns(:)

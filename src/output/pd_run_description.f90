@@ -1,5 +1,4 @@
-!> What a result file says about a run beside its frames and rows: where it comes from, the input,
-!> the points.
+!> What a result file says about a run apart from frames and rows: provenance, input, points.
 module pd_run_description
   use pd_errors, only: error_list_t
   use pd_frame_fields, only: frame_field_t
@@ -24,7 +23,7 @@ module pd_run_description
     integer :: threads = 1
   end type provenance_t
 
-  !> Everything that a result file says beside its frames and rows, and what these hold.
+  !> Everything in a result file except frames and rows, and what these hold.
   type :: run_description_t
     type(provenance_t) :: provenance
     character(:), allocatable :: title, name

@@ -1,8 +1,8 @@
-!> The XDMF file beside a result file: what lets ParaView open it.
+!> The XDMF file of a result file: ParaView needs it to open the result.
 !>
-!> It holds no numbers, only where they lie in the HDF5 file, named without a folder so that both
-!> can be moved together. Vectors in the plane get a third component 0, which ParaView's filters
-!> (warp, glyph) ask for; tensors become one scalar per component.
+!> It holds no numbers, only their paths in the HDF5 file, which is named without a folder so that
+!> both can be moved together. Vectors in the plane get a third component 0, which ParaView's
+!> filters (warp, glyph) ask for; tensors become one scalar per component.
 module pd_xdmf
   use pd_errors, only: error_list_t
   use pd_files, only: write_whole_file

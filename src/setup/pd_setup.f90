@@ -20,7 +20,7 @@ contains
   !> Operators, materials, supports, loads, damping.
   !>
   !> Errors: points that coincide, families that are too small, no free point, a pressure that acts
-  !> on none.
+  !> on no point.
   subroutine set_up_model(input, model, errors)
     type(input_t),      intent(in)    :: input
     type(model_t),      intent(inout) :: model    !! in: with its body
@@ -44,8 +44,7 @@ contains
     if (.not. any(model%points%free > 0.0_wp)) call errors%add('no point is free to move')
   end subroutine set_up_model
 
-  !> Lattice operators for a body on a lattice, unless a list is asked for; the bond list for any
-  !> other.
+  !> Lattice operators for a body on a lattice, unless a list is asked for; otherwise the bond list.
   subroutine choose_operators(horizon, form, model, errors)
     type(horizon_t),    intent(in)    :: horizon
     character(*),       intent(in)    :: form   !! auto, lattice or list

@@ -1,4 +1,4 @@
-!> From checked input to the body: its points, their volumes, and who owns them.
+!> From checked input to the body: its points, their volumes, and the boundaries they belong to.
 module pd_setup_body
   use pd_cloud, only: read_cloud
   use pd_errors, only: error_list_t
@@ -34,7 +34,7 @@ contains
       maxval(abs(body%position)), warnings, errors)
   end subroutine set_up_body
 
-  !> Whether a random field can be shown by the points, and whether it can be computed.
+  !> Check that the points can resolve a random field, and that it can be computed.
   subroutine look_at_scales(correlation_length, spacing, farthest, warnings, errors)
     real(wp),           intent(in)    :: correlation_length, spacing   !! [m]
     real(wp),           intent(in)    :: farthest                      !! largest coordinate [m]
@@ -48,7 +48,7 @@ contains
     end if
   end subroutine look_at_scales
 
-  !> Body from a point cloud. Where the input gives its real extent, that counts.
+  !> Body from a point cloud. An extent given in the input takes precedence over that of the points.
   subroutine cloud_body(input, body, input_errors, errors)
     type(input_t),      intent(in)    :: input
     type(body_t),       intent(out)   :: body

@@ -1,7 +1,7 @@
 !> From checked input to supports, platens and loads.
 !>
-!> Sides, layers and names become sets of points here: supports and loads see nothing else of a
-!> body.
+!> Sides, layers and names become sets of points here; supports and loads know nothing else about
+!> the body.
 module pd_setup_loads
   use pd_affine_support, only: new_affine_support
   use pd_errors, only: error_list_t
@@ -40,7 +40,7 @@ contains
     call model%supports%mark_prescribed(model%points%free)
   end subroutine set_up_supports
 
-  !> Support number k, of the kind that its boundary asks for.
+  !> Support number k, of the kind that its boundary describes.
   subroutine new_support(given, k, mass, model, support)
     type(boundary_input_t), intent(in) :: given(:)
     integer,       intent(in) :: k
@@ -66,7 +66,7 @@ contains
     end associate
   end subroutine new_support
 
-  !> The components in which a boundary takes forces from the body; in the others the body slides.
+  !> The components in which a boundary transfers forces; in the others the body slides.
   pure function taken(boundary)
     type(boundary_input_t), intent(in) :: boundary
     logical :: taken(2)
@@ -107,7 +107,7 @@ contains
 
   end function loaded_lengths
 
-  !> The two supports that approach each other, where there are such.
+  !> The two supports that approach each other, if there are such.
   subroutine set_up_platens(input, model)
     type(input_t), intent(in)    :: input
     type(model_t), intent(inout) :: model

@@ -1,4 +1,4 @@
-!> From checked input to what the points are made of: laws, strain measures, strength, control.
+!> From checked input to the materials of the points: laws, strain measures, strength, control.
 !>
 !> A new law or strain measure is a module of its own and a line in `new_law` or `new_measure`.
 module pd_setup_materials

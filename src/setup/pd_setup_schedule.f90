@@ -15,7 +15,7 @@ module pd_setup_schedule
 
 contains
 
-  !> Time step by the rule asked for, and the steps of the run, its frames and rows.
+  !> Time step by the rule of the input, and the steps of the run, of its frames and rows.
   !>
   !> `clock`: in: that of a checkpoint; with a time step of 0 the rule decides.
   !> Errors: a run with too many steps, a strain that is never reached.

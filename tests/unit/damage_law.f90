@@ -36,7 +36,7 @@ contains
     columns(2) = label_t('damage', '1', 'part of the stiffness that is lost')
   end function remembers
 
-  !> What is dissipated is (1/2) G kappa_0 d kappa: half of the work on the plateau.
+  !> The dissipation is (1/2) G kappa_0 d kappa: half of the work on the plateau.
   pure subroutine stress_block(self, first, lo, hi, strain, points, flow)
     class(damage_t), intent(in) :: self
     integer,  intent(in) :: first, lo, hi

@@ -239,7 +239,7 @@ contains
       call operators%set_control(control_stiffness(g, 50.0e6_wp, delta, operators%weight_sum))
   end subroutine connect
 
-  !> The model of a body that nothing holds or loads, with a strength of 0.15 MPa everywhere.
+  !> The model of a body without supports and loads, with a strength of 0.15 MPa everywhere.
   !>
   !> `free`: 0 where a component keeps its velocity; all move freely without it.
   function model_of(body, delta, materials, g, free) result(model)
