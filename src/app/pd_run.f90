@@ -39,7 +39,7 @@ module pd_run
     type(step_work_t)  :: work
     type(record_t)     :: record
     type(timing_t)     :: timing
-    type(checkpoint_t) :: checkpoint          !! that it goes on from; no rows: a new run
+    type(checkpoint_t) :: checkpoint          !! to continue from; no rows: a new run
     type(error_list_t) :: warnings
     integer(int64) :: last_checkpoint = 0     !! count of the system clock
     integer(int64) :: loop_start = 0          !! count of the system clock
@@ -81,7 +81,7 @@ contains
   end subroutine set_up_run
 
   !> Results of an earlier run are overwritten or continued only on request; a checkpoint is read
-  !> where the run goes on from it.
+  !> if the run continues from it.
   subroutine look_for_earlier_run(options, run, outcome)
     type(options_t), intent(in)    :: options
     type(run_t),     intent(inout) :: run

@@ -223,7 +223,7 @@ contains
     call say(record%progress, text, errors)
   end subroutine record_line
 
-  !> Write a checkpoint of the state after a step, and before it the rows that it counts.
+  !> Write a checkpoint of the state after a step, but first the rows of the history before it.
   subroutine save_checkpoint(model, state, ledger, clock, record, errors)
     type(model_t),      intent(in)    :: model
     type(state_t),      intent(in)    :: state
