@@ -99,7 +99,8 @@ report:            ## results/report.html, one page with all studies, after maki
 	  $(venv)/bin/perigeo-post report $(if $(PUBLISH),--publish) && exit $${failed:-0}
 
 report-view:       ## open that page in a browser without a window: checks and screenshots
-	@$(or $(wildcard $(venv)/bin/python),python3) tools/view_report.py
+	@sh tools/python_env.sh view
+	@$(venv)/bin/python tools/view_report.py
 
 test:              ## set-up, build and the whole test suite; BUILD=debug: with all checks
 	@sh tools/setup.sh test

@@ -1,7 +1,8 @@
-# Put perigeo-post and what it needs into .venv:  sh tools/python_env.sh run|test|lint|site
+# Put perigeo-post and what it needs into .venv:  sh tools/python_env.sh run|test|lint|site|view
 #
-#   run   the package itself          test   also what the tests need
-#   lint  also the linters            site   what makes the pages of `make site`
+#   run   the package, with studies and report     test   also what the tests need
+#   lint  also the linters                         site   what makes the pages of `make site`
+#   view  what opens the report in a browser
 #
 # Says nothing when everything is there already, and then needs no network. Leaves with 1, after a
 # message, where Python or the network is missing. NO_INSTALL=1 never installs.
@@ -10,11 +11,12 @@ venv=.venv
 stamp=.venv/.perigeo-$level
 
 case $level in
-  run) package=./postproc ;;
-  test) package='./postproc[test]' ;;
-  lint) package='./postproc[test,lint]' ;;
+  run) package='./postproc[study,report]' ;;
+  test) package='./postproc[study,report,test]' ;;
+  lint) package='./postproc[study,report,test,lint]' ;;
   site) package='./postproc[site]' ;;
-  *) echo "tools/python_env.sh: '$level': it must be run, test, lint or site" >&2; exit 1 ;;
+  view) package='./postproc[view]' ;;
+  *) echo "tools/python_env.sh: '$level': it must be run, test, lint, site or view" >&2; exit 1 ;;
 esac
 
 if [ ! -f postproc/pyproject.toml ]; then

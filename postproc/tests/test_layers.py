@@ -47,6 +47,23 @@ def test_without_matplotlib_a_figure_cannot_be_drawn() -> None:
     assert python("from perigeo_post import save_figure").returncode == 1
 
 
+@pytest.mark.parametrize(
+    ("command", "gone"),
+    [(["study", "a.toml"], "simpleeval"), (["study", "a.toml"], "pydantic"),
+     (["report"], "pydantic")],
+)  # fmt: skip
+def test_a_command_without_its_extra_says_how_to_install_it(command: list[str], gone: str) -> None:
+    code = (
+        f"import sys; sys.modules[{gone!r}] = None\n"
+        "from perigeo_post.cli.command_line import main\nsys.exit(main(sys.argv[1:]))"
+    )
+    done = subprocess.run([sys.executable, "-c", code, *command], capture_output=True, text=True)
+    assert done.returncode == 1
+    (line,) = done.stderr.splitlines()
+    assert line.startswith(f"perigeo-post: error: perigeo-post {command[0]} needs {gone}, which is")
+    assert line.endswith(f"-m pip install './postproc[{command[0]}]'")
+
+
 def test_every_public_name_is_found() -> None:
     assert {"Run", "measure_band", "save_figure", "run_study"} <= set(perigeo_post.__all__)
     for name in perigeo_post.__all__:

@@ -6,6 +6,9 @@ import base64
 import io
 import json
 import re
+import subprocess
+import sys
+from fnmatch import fnmatch
 from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
@@ -23,6 +26,11 @@ from perigeo_post.report.publish import BEGIN, END, publish, tables
 from perigeo_post.report.values import HEADLINE, QUALITY, column_text, duration, number, prefixed
 from perigeo_post.report.write import gather, write_report
 from perigeo_post.study.measures import MEASURES
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
 
 Capture = pytest.CaptureFixture[str]
 SHA = "0123456789abcdef" * 4
@@ -412,6 +420,8 @@ def test_studies_without_results_are_named(results: Path, tmp_path: Path) -> Non
         ({"findings": [{"title": "a", "verdict": "agrees", "holds": ["a"]}]}, "holds[0]"),
         ({"units": {"a": 1}}, "'units.a' is 1; it must be text"),
         ({"problems": "a"}, "'problems' is \"a\"; it must be a list of texts"),
+        ({"title": 3, "csv": 4}, "'title' is 3; it must be text"),
+        ({"title": 3, "csv": 4}, "'csv' is 4; it must be text"),
     ],
 )
 def test_a_broken_study_is_named_with_the_reason(
@@ -480,7 +490,7 @@ def test_files_outside_the_study_are_refused(results: Path) -> None:
 def test_a_broken_verification_does_not_stop_the_report(results: Path) -> None:
     (results / "verify" / "verify.json").write_text('[{"quantity": "a"}]')
     report = write_report(results)
-    assert "'rows[0].exact' is missing" in report.unreadable[0]
+    assert "'[0].exact' is missing" in report.unreadable[0]
     assert "Verification" not in Reader(report.path).text
 
 
@@ -637,6 +647,35 @@ def test_a_document_without_markers_is_left_alone(results: Path, tmp_path: Path,
     with pytest.raises(RequestError, match="studies: begin"):
         publish(gather(results), document)
     assert document.read_text() == text
+
+
+def test_without_jinja2_the_command_says_what_to_install(results: Path) -> None:
+    code = (
+        "import sys; sys.modules['jinja2'] = None\n"  # makes every import of it fail
+        "from perigeo_post.cli.command_line import main\nsys.exit(main(sys.argv[1:]))"
+    )
+    command = [sys.executable, "-c", code, "report", "--results", str(results)]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 1
+    (line,) = done.stderr.splitlines()
+    assert line.startswith("perigeo-post: error: perigeo-post report needs jinja2, which is not ")
+    assert line.endswith("-m pip install './postproc[report]'")
+    assert not (results / "report.html").exists()
+
+
+def test_an_installed_package_holds_every_file() -> None:
+    """Templates and the style sheet; in a checkout they are found in any case."""
+    root = Path(__file__).parents[1]
+    package = root / "perigeo_post"
+    settings = tomllib.loads((root / "pyproject.toml").read_text(encoding="utf-8"))
+    patterns = settings["tool"]["setuptools"]["package-data"]["perigeo_post"]
+    files = {
+        path.relative_to(package).as_posix()
+        for path in package.rglob("*")
+        if path.is_file() and path.suffix not in (".py", ".pyc")
+    }
+    assert {f"report/templates/{name}" for name in ("page.html", "style.css")} <= files
+    assert not [f for f in files if not any(fnmatch(f, pattern) for pattern in patterns)]
 
 
 # ---- numbers -------------------------------------------------------------------------------------

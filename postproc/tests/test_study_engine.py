@@ -82,7 +82,7 @@ def test_expressions_have_the_values_of_arithmetic(text: str, value: object) -> 
         ("m / 0", "division by zero"),
         ("0.0 ** -1", "division by zero"),
         ("m % 0", "division by zero"),
-        ("9 ** 9 ** 9", "a power is too large"),
+        ("9 ** 9 ** 9", "don't want to evaluate 9 ** 387420489"),
         ("10.0 ** 400", "a number is too large"),
         ("1e308 * 10", "no finite number"),
         ("(-8) ** 0.5", "is no real number"),
@@ -93,9 +93,10 @@ def test_expressions_have_the_values_of_arithmetic(text: str, value: object) -> 
         ("sqrt('a')", "'sqrt"),
         ("1 < 'a'", "'1 < 'a''"),
         ("max([])", "there are no values"),
-        ("m['a']", "only a whole number"),
-        ("[1][1]", "there is no value number 1"),
-        ("m[0]", "a list is needed"),
+        ("m['a']", "'int' object is not subscriptable"),
+        ("[1]['a']", "list indices must be integers"),
+        ("[1][1]", "list index out of range"),
+        ("m[0]", "not subscriptable"),
         ("(" * 500 + "1" + ")" * 500, "no expression"),
         ("-" * 1500 + "1", "expression"),
         ("1" * 2001, "more than 2000 characters"),
@@ -117,6 +118,7 @@ def test_columns_are_joined_run_by_run() -> None:
     assert table_value("w / d", w=width, d=delta).by_run == {"a": 2.0, "c": 5.0}
     assert table_value("(2 * w - 1)[1]", w=width) == 11.0
     assert table_value("all(1 < w < 7)", w=width) is True
+    assert table_value("all(3 < w < 7)", w=width) is False
     assert table_value("all(w < d)", w=width, d=delta) is False
     assert table_value("ratio(w) + mean(w) + median(w) + len(w) + sum(w)", w=width) == (
         pytest.approx(3 + 13 / 3 + 5 + 3 + 13)
@@ -160,14 +162,14 @@ def test_a_finding_compares_numbers_of_the_table() -> None:
         "most < b", "most > 2", "len(col('w', m=[1, 3])) == 2", "all > 1",
         "val('w', run='a2') == 2",
     )  # fmt: skip
-    assert evaluate(one, ROWS) == {
+    assert evaluate(one, ROWS).model_dump() == {
         "title": "Title",
         "paper": "Paper",
         "found": "3.0 and 5, [3.0, 2.0, 5.0]",
         "verdict": "agrees",
         "note": "Note",
         "values": {"most": 3.0, "b": 5.0, "all": [3.0, 2.0, 5.0]},
-        "holds": [[test.text, True] for test in one.holds],
+        "holds": [(test.text, True) for test in one.holds],
     }
 
 
@@ -185,16 +187,16 @@ def test_a_finding_compares_numbers_of_the_table() -> None:
 )
 def test_the_verdict_follows_from_the_tests(holds: list[str], verdict: str) -> None:
     found = evaluate(finding({"w": "val('w', series='a', m=1)"}, "{w}", *holds), ROWS)
-    assert found["verdict"] == verdict
-    assert found["found"].startswith("no result: " if verdict == "no result" else "3.0")
+    assert found.verdict == verdict
+    assert found.found.startswith("no result: " if verdict == "no result" else "3.0")
 
 
 def test_numbers_that_are_missing_are_no_result() -> None:
     found = evaluate(finding({"n": "max(col('n'))"}, "{n:.1f}", "n > 1"), ROWS)
-    assert found["verdict"] == "no result"
-    assert "no run has a 'n'" in found["found"]
-    assert found["holds"] == []
-    assert evaluate(finding({"n": "'text'"}, "{n:.1f}", "1 > 0"), ROWS)["verdict"] == "no result"
+    assert found.verdict == "no result"
+    assert "no run has a 'n'" in found.found
+    assert found.holds == []
+    assert evaluate(finding({"n": "'text'"}, "{n:.1f}", "1 > 0"), ROWS).verdict == "no result"
 
 
 # ---- namelists -------------------------------------------------------------------------------

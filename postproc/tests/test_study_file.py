@@ -10,7 +10,7 @@ import pytest
 
 from perigeo_post.draw.style import new_figure
 from perigeo_post.study.file import Kinds, Study, load_study
-from perigeo_post.study.options import OPTIONS
+from perigeo_post.study.tables import OPTIONS
 from perigeo_post.study.toml import StudyError, key_lines
 from perigeo_post.study.types import Column, Drawing, Measure
 
@@ -75,7 +75,9 @@ def test_every_combination_of_parameters_is_a_run(load: Any) -> None:
     assert study.runs[3].parameters == {"delta": 0.25, "m": 1}
     assert study.runs[3].label == "delta = 0.25, m = 1"
     assert study.series == (("trial", "Trial"),)
-    assert list(study.columns)[5:] == ["delta", "m", "points", "steps", "width"]
+    assert list(study.columns)[5:] == [
+        "delta", "m", "points", "steps", "width", "reasons",
+    ]  # fmt: skip
 
 
 def test_expressions_set_values_of_the_namelist(load: Any) -> None:
@@ -244,7 +246,7 @@ FINDING = '[[finding]]\ntitle = "F"\nfound = "{a}"\n'
         (SWEPT + "[[figure]]\n" + FIGURE + "only = { n = 1 }\n",
          "line 14, figure 1, only, n: unknown key"),
         (SWEPT + "[[figure]]\n" + FIGURE + "x_range = [1]\n",
-         "line 14, figure 1, x_range: the option cannot be this; found: [1]; allowed: [low, high]"),
+         "line 14, figure 1, x_range: must be [low, high]; found: [1]"),
         (SWEPT + "[[figure]]\n" + FIGURE + "strain = [0.004, 0.02]\n",
          "strain: none of its runs has a frame at this strain; found: 0.02; allowed: 0.004, 0.01"),
         (SWEPT + "[[figure]]\n" + FIGURE + "series = ['a']\n",
@@ -284,6 +286,43 @@ def test_all_mistakes_are_found_at_once(wrong: Any) -> None:
     assert len(found) == 7, found
     for word in ("bend", "x_mim", "unknown name n", "polt", "alt is missing", "{a}", "a test"):
         assert any(word in line for line in found), word
+
+
+def test_what_is_wrong_does_not_hide_what_else_is_wrong(wrong: Any) -> None:
+    """A mistake of form in each table, and beside it one that only the rest of it shows."""
+    text = HEAD.replace('["band"]', '[2, "bend", 3, "peek"]') + (
+        'strain = "1 %"\nextra = 1\n[parameters]\nm = [1, 2]\nrun = 1\n'
+        "[set.body]\nx_mim = 'unset'\nx_min = 2020-01-01\n"
+        "[[case]]\nlabel = 3\nset = { 'body.y_mim' = 'unset' }\n"
+        "[[figure]]\nname = 'W'\nkind = 'plot'\nx = 1\ny = 'wdith'\ntitle = ''\n"
+        "[[finding]]\ntitle = 'F'\nfound = '{b}'\nvalues = { a = 1, c = 'n' }\n"
+        "holds = ['1 +', 'd']\n"
+    )
+    expected = [
+        "line 4, measures: must be a text; found: 3",
+        "line 4, measures: unknown measure, did you mean 'band'?; found: \"bend\"",
+        "line 4, measures: unknown measure, did you mean 'peak'?; found: \"peek\"",
+        "line 5, strain: must be a number",
+        "line 6, extra: unknown key",
+        "line 9, parameters, run: cannot be the name",
+        'line 11, set, "body.x_mim": there is no x_mim to take out',
+        'line 12, set, "body.x_min": must be a number, a text or a list of them; found: 2020-01-01',
+        "line 14, case 1, label: must be a text; found: 3",
+        'line 15, case 1, set, "body.y_mim": there is no y_mim to take out',
+        "line 17, figure 1, name: is no name",
+        "line 19, figure 1, x: must be a text; found: 1",
+        'line 20, figure 1, y: unknown column; found: "wdith"',
+        "line 21, figure 1, title: must not be empty",
+        "line 16, figure 1: the key alt is missing",
+        "line 24, finding 1, found: unknown name {b}",
+        "line 25, finding 1, values, a: must be an expression, a text; found: 1",
+        "line 25, finding 1, values, c: 'n': unknown name n",
+        "line 26, finding 1, holds: '1 +' is no expression",
+        "line 26, finding 1, holds: 'd': unknown name d",
+    ]
+    found = wrong(text)
+    for line in expected:
+        assert any(one.startswith(line) for one in found), (line, found)
 
 
 @pytest.mark.parametrize(

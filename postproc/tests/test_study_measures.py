@@ -10,14 +10,21 @@ import pytest
 
 from perigeo_post import Run
 from perigeo_post.study.measures import MEASURES, line_meeting
-from perigeo_post.study.types import State, Value
+from perigeo_post.study.types import Missing, State, Value
 
 AT_ONE = State(0.01)
 PAPER = ((0.0, 0.5), (1.0, 1.5))
 
 
 def take(path: Path, group: str, state: State = AT_ONE) -> dict[str, Value]:
-    return MEASURES[group].take(Run(path), state)
+    """The values of a group, None where there is a reason in place of a value."""
+    found = MEASURES[group].take(Run(path), state)
+    return {k: None if isinstance(v, Missing) else v for k, v in found.items()}
+
+
+def reasons(path: Path, group: str, state: State = AT_ONE) -> dict[str, str]:
+    found = MEASURES[group].take(Run(path), state)
+    return {k: v.reason for k, v in found.items() if isinstance(v, Missing)}
 
 
 @pytest.mark.parametrize("group", sorted(MEASURES))
@@ -30,6 +37,15 @@ def test_every_column_is_there_and_nothing_is_raised(
     assert list(found) == list(MEASURES[group].columns)
     for value in found.values():
         assert value is None or isinstance(value, (bool, str)) or np.isfinite(value)
+
+
+def test_a_value_that_is_not_there_has_a_reason(result: Path, cloud: Path) -> None:
+    assert "frames" in reasons(result, "modulus")["modulus_gauge"]
+    assert set(reasons(result, "field").values()) == {
+        "the result holds no field of the yield stress"
+    }
+    for group in MEASURES:
+        assert all(reasons(cloud, group).values())
 
 
 def test_columns_have_units_and_sentences_and_one_group_each() -> None:

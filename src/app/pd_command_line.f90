@@ -195,7 +195,8 @@ contains
       '  --quiet             no progress on the screen; errors still appear', &
       '  --set GROUP.KEY=VALUE', &
       '                      a value in place of that of the input file, as often as needed:', &
-      '                      material.density=1800, boundary.top.velocity=0,-0.02', &
+      '                      material.density=1800, boundary.top.velocity=0,-0.02; nothing', &
+      '                      behind the = takes a key or a group out', &
       '  --print-input       print an input file with all values as used; run nothing', &
       '  --input-reference   print the tables of all input keys (see doc/input.md); with', &
       '                      --json for programs', &

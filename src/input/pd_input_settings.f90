@@ -2,7 +2,8 @@
 !>
 !> A group that is given several times is chosen by its own name or its number:
 !> boundary.top.velocity, body.2.x_max. A value that is set joins those of the file, and goes
-!> through the same checks.
+!> through the same checks. Nothing behind the = takes a key out, `group.key=`, or a group,
+!> `group=` and `group.name=`; a name that no group of this kind has adds one.
 module pd_input_settings
   use pd_errors, only: error_list_t
   use pd_input_values, only: count_groups, did_you_mean
@@ -10,7 +11,7 @@ module pd_input_settings
   use pd_keys, only: allowed_values, find_group, find_key, kind_text
   use pd_namelist, only: scan_namelist
   use pd_namelist_groups, only: namelist_entry_t, namelist_group_t
-  use pd_text, only: integer_text, lower_case, quoted_list, read_integer, shortened
+  use pd_text, only: integer_text, is_name, lower_case, quoted_list, read_integer, shortened
   implicit none
   private
 
@@ -21,7 +22,8 @@ module pd_input_settings
     character(:), allocatable :: text
   end type setting_t
 
-  !> The parts of one setting. `which`: empty, a name or a number; `place` names it in messages.
+  !> The parts of one setting. `which`: empty, a name or a number; `key`: empty where a group is
+  !> taken out; `place` names it in messages.
   type :: parts_t
     character(:), allocatable :: place, group, which, key, value
   end type parts_t
@@ -44,16 +46,22 @@ contains
 
     do s = 1, size(settings)
       before = errors%count()
-      call split(settings(s)%text, parts, errors)
+      call split(settings(s)%text, list, parts, errors)
       if (errors%count() == before) call find_place(parts, list, path, groups, i, errors)
-      if (errors%count() == before) call read_value(parts, list, entry, errors)
-      if (errors%count() == before) call replace(groups(i), entry)
+      if (errors%count() > before) cycle
+      if (parts%value == '') then
+        call take_out(parts, groups, i, errors)
+      else
+        call read_value(parts, list, entry, errors)
+        if (errors%count() == before) call replace(groups(i), entry)
+      end if
     end do
   end subroutine apply_settings
 
-  !> group.key=value or group.which.key=value
-  subroutine split(text, parts, errors)
+  !> group.key=value or group.which.key=value; without a value group= and group.which= too.
+  subroutine split(text, list, parts, errors)
     character(*),       intent(in)    :: text
+    type(key_list_t),   intent(in)    :: list
     type(parts_t),      intent(out)   :: parts
     type(error_list_t), intent(inout) :: errors
     character(:), allocatable :: name
@@ -63,9 +71,14 @@ contains
     equals = index(text, '=')
     name = ''
     if (equals > 0) name = lower_case(trim(adjustl(text(:equals - 1))))
+    parts%value = ''
+    if (equals > 0) parts%value = trim(adjustl(text(equals + 1:)))
+    if (equals > 0 .and. is_group(name, list)) then
+      if (parts%value == '') name = name//'.'
+    end if
     first = index(name, '.')
     last = index(name, '.', back=.true.)
-    if (first < 2 .or. last == len(name)) then
+    if (first < 2 .or. (last == len(name) .and. parts%value /= '')) then
       call errors%add('no key with a value', where=parts%place, &
                       allowed='group.key=value or group.name.key=value')
       return
@@ -73,9 +86,20 @@ contains
     parts%group = name(:first - 1)
     parts%which = name(first + 1:last - 1)
     parts%key = name(last + 1:)
-    parts%value = trim(adjustl(text(equals + 1:)))
-    if (parts%value == '') call errors%add('the value is missing', where=parts%place)
   end subroutine split
+
+  !> Whether the name is that of a group without a key: of the group itself, or of one of several of
+  !> its kind; the part after the dot is then not a key.
+  pure logical function is_group(name, list)
+    character(*),     intent(in) :: name
+    type(key_list_t), intent(in) :: list
+    integer :: dot
+
+    dot = index(name//'.', '.')
+    is_group = find_group(list%groups, name(:dot - 1)) > 0
+    if (is_group .and. dot < len(name)) is_group = index(name(dot + 1:), '.') == 0 .and. &
+      find_key(list%keys, name(:dot - 1), name(dot + 1:)) == 0
+  end function is_group
 
   !> The index of the group; a group that may be given only once is added if the file lacks it.
   subroutine find_place(parts, list, path, groups, i, errors)
@@ -98,6 +122,12 @@ contains
     n = count_groups(groups, parts%group)
     if (parts%which /= '') then
       i = group_of(groups, parts%group, parts%which)
+      if (i == 0 .and. parts%value /= '' .and. is_name(parts%which) .and. &
+        find_key(list%keys, parts%group, 'name') > 0) then
+        call append(groups, parts%group, parts%place)
+        i = size(groups)
+        call replace(groups(i), text_entry('name', parts%which, parts%place))
+      end if
       if (i == 0) call errors%add('the file has no such group', where=parts%place, &
         found=shortened(parts%which), allowed='a name of &'//parts%group//' or 1 to '// &
         integer_text(n))
@@ -139,6 +169,38 @@ contains
     i = 0
   end function group_of
 
+  !> Take a key out of its group, or the group out of the file.
+  subroutine take_out(parts, groups, i, errors)
+    type(parts_t),                       intent(in)    :: parts
+    type(namelist_group_t), allocatable, intent(inout) :: groups(:)
+    integer,                             intent(in)    :: i   !! of the group
+    type(error_list_t),                  intent(inout) :: errors
+    integer :: k, e
+
+    if (parts%key == '') then
+      groups = [(groups(k), k=1, i - 1), (groups(k), k=i + 1, size(groups))]
+      return
+    end if
+    e = groups(i)%find(parts%key)
+    if (e == 0) then
+      call errors%add('there is no such key to take out', where=parts%place)
+    else
+      groups(i)%entries = [(groups(i)%entries(k), k=1, e - 1), &
+        (groups(i)%entries(k), k=e + 1, size(groups(i)%entries))]
+    end if
+  end subroutine take_out
+
+  !> key = 'text', given at a place.
+  pure type(namelist_entry_t) function text_entry(key, text, place) result(entry)
+    character(*), intent(in) :: key, text, place
+
+    entry%key = key
+    entry%place = place
+    allocate (entry%values(1))
+    entry%values(1)%text = text
+    entry%values(1)%quoted = .true.
+  end function text_entry
+
   subroutine append(groups, name, path)
     type(namelist_group_t), allocatable, intent(inout) :: groups(:)
     character(*),                        intent(in)    :: name, path
@@ -166,17 +228,10 @@ contains
     type(error_list_t) :: problems
     integer :: k
 
-    entry%key = parts%key
-    entry%place = parts%place
+    entry = text_entry(parts%key, parts%value, parts%place)
     k = find_key(list%keys, parts%group, parts%key)
-    if (k == 0) then   ! check_groups reports it
-      call take_as_text(parts%value, entry)
-      return
-    end if
-    if (list%keys(k)%kind == kind_text .and. verify(parts%value(1:1), '''"') > 0) then
-      call take_as_text(parts%value, entry)
-      return
-    end if
+    if (k == 0) return   ! check_groups reports it
+    if (list%keys(k)%kind == kind_text .and. verify(parts%value(1:1), '''"') > 0) return
     call scan_namelist(parts%place, '&a b = '//parts%value//' /', scanned, problems)
     if (problems%count() == 0 .and. size(scanned) == 1) then
       if (size(scanned(1)%entries) == 1) then
@@ -187,15 +242,6 @@ contains
     call errors%add('the value cannot be read', where=parts%place, found=shortened(parts%value), &
                     allowed=allowed_values(list%keys(k)))
   end subroutine read_value
-
-  subroutine take_as_text(text, entry)
-    character(*),           intent(in)    :: text
-    type(namelist_entry_t), intent(inout) :: entry
-
-    allocate (entry%values(1))
-    entry%values(1)%text = text
-    entry%values(1)%quoted = .true.
-  end subroutine take_as_text
 
   !> Replace the entry of this key, or add it to the others.
   subroutine replace(group, entry)

@@ -100,17 +100,23 @@ contains
   pure real(wp) function plastic_strain(block) result(part)
     type(block_view_t), intent(in) :: block
     real(wp) :: alpha(n_block)
-    integer  :: i
 
     call block%model%materials%plastic_strain_block(block%number, block%state%law_points_t, alpha)
-    part = 0.0_wp
-    associate (in_body => block%model%points%in_body, lo => block%lo)
-      !$omp simd simdlen(8) reduction(max:part)
-      do i = lo, block%hi
-        part = max(part, in_body(i) * alpha(i - lo + 1))
-      end do
-    end associate
+    part = largest_with_weight(block%hi - block%lo + 1, block%weight, alpha)
   end function plastic_strain
+
+  !> Largest of the first n values that have a weight, or 0; without a branch.
+  pure real(wp) function largest_with_weight(n, weight, values) result(found)
+    integer,  intent(in) :: n
+    real(wp), intent(in) :: weight(n_block), values(n_block)
+    integer :: b
+
+    found = 0.0_wp
+    !$omp simd simdlen(8) reduction(max:found)
+    do b = 1, n
+      found = max(found, merge(values(b), 0.0_wp, weight(b) > 0.0_wp))
+    end do
+  end function largest_with_weight
 
   pure real(wp) function kinetic_energy(block) result(part)
     type(block_view_t), intent(in) :: block
@@ -140,19 +146,25 @@ contains
   pure real(wp) function strain_energy(block) result(part)
     type(block_view_t), intent(in) :: block
     real(wp) :: terms(n_block)
-    integer  :: i, b
 
     if (block%hi - block%lo + 1 < n_block) terms = 0.0_wp
     call block%model%materials%energy_block(block%number, block%state%law_points_t, terms)
-    associate (volume => block%model%points%volume)
-      !$omp simd simdlen(8) private(b)
-      do i = block%lo, block%hi
-        b = i - block%lo + 1
-        terms(b) = volume(i) * terms(b)
-      end do
-    end associate
+    call weigh(block%lo, block%hi, block%model%points%volume, terms)
     part = block_sum(terms)
   end function strain_energy
+
+  !> V times the terms of rows lo to hi.
+  pure subroutine weigh(lo, hi, volume, terms)
+    integer,  intent(in) :: lo, hi
+    real(wp), intent(in), contiguous :: volume(:)
+    real(wp), intent(inout) :: terms(n_block)
+    integer :: i
+
+    !$omp simd simdlen(8)
+    do i = lo, hi
+      terms(i - lo + 1) = volume(i) * terms(i - lo + 1)
+    end do
+  end subroutine weigh
 
   ! ---- from elsewhere -----------------------------------------------------------------------
 

@@ -252,7 +252,11 @@ WRONG_SETTINGS = {
     "discretization.spacing=0.1": "unknown group, did you mean 'discretisation'?",
     "discretisation.spacing=abc": "--set discretisation.spacing=abc: text where a number is due",
     "material.density=-1": "--set material.density=-1: out of range; found: -1; allowed: > 0",
-    "material.clay.density=1": "the file has no such group; found: clay",
+    "material.clay.density=1": "--set material.clay.density=1, &material model: the key is missing",
+    "material.clay.density=": "the file has no such group; found: clay",
+    "material.poissons_ratio=": "&material poissons_ratio: the key is missing",
+    "boundary.top.contact=": "--set boundary.top.contact=: there is no such key to take out",
+    "boundary.top=": "the key needs platens, and there are none; found: 1 boundaries",
     "boundary.velocity=0,1": "the file has several groups of this name; found: 2 groups",
     "boundary.top.velocity=1": "--set boundary.top.velocity=1: too few values",
     "material.density=1 /": "the value cannot be read; found: 1 /",
@@ -274,6 +278,18 @@ def test_a_setting_without_a_value_is_a_wrong_command_line(run_case, tmp_path):
 
 SETTINGS = ["run.title=it's soil", "boundary.top.velocity=0,-0.02", "body.1.x_max=1.0"]
 SETTINGS += ["stabilisation.method=silling", "stabilisation.factor=0.5", "material.density=1800"]
+
+
+def test_settings_take_out_keys_and_groups_and_add_groups(run_case, tmp_path):
+    options = ["material.residual_strength=", "material.kinematic_modulus=", "output="]
+    options += ["pressure.left.side=left", "pressure.left.value=5e4"]
+    options = [word for setting in options for word in ("--set", setting)]
+    done = run_case(VALID, tmp_path, *options, "--print-input")
+    assert done.returncode == 0, done.stderr
+    for line in ("kinematic_modulus = 0.0", "frame_count = 10", "name = 'left'", "value = 50000.0"):
+        assert f"\n  {line}\n" in done.stdout
+    assert "residual_strength" not in done.stdout
+    assert "frame_strains" not in done.stdout
 
 
 def test_what_is_printed_says_what_was_set_and_reads_back(run_case, tmp_path):

@@ -19,12 +19,14 @@ from perigeo_post import RequestError, StudyError, StudyOptions, run_study
 from perigeo_post.cli.command_line import main
 from perigeo_post.draw.style import new_figure
 from perigeo_post.measure import curves
+from perigeo_post.study.checked import mistakes
 from perigeo_post.study.figures import FIGURE_OPTIONS
 from perigeo_post.study.file import Kinds
 from perigeo_post.study.jobs import only_one
 from perigeo_post.study.measures import MEASURES
-from perigeo_post.study.options import OPTIONS
-from perigeo_post.study.types import Column, Drawing, Measure
+from perigeo_post.study.tables import OPTIONS, FigureOptions
+from perigeo_post.study.types import Column, Drawing, Measure, Missing
+from pydantic import ValidationError
 
 BASE = SPECIMEN.replace("output_dir = 'out'", "title = 'a specimen'")
 STUDY = """\
@@ -328,6 +330,32 @@ def test_a_measure_or_figure_that_breaks_does_not_cost_the_others(do):
     assert "other cannot be measured" in words
 
 
+def test_a_value_that_is_missing_has_its_reason_wherever_it_is_shown(do, tmp_path):
+    def far(run, state):
+        return {"slope": Missing(f"{run.path} ends too early"), "size": 1.0, "void": Missing("?")}
+
+    columns = {name: Column("1", name) for name in ("slope", "size", "void", "forgotten")}
+    text = STUDY.replace('["peak"]', '["peak", "far"]')
+    kinds = dataclasses.replace(KINDS, measures={**KINDS.measures, "far": Measure(columns, far)})
+    status, words = do(text, kinds, output=tmp_path / "elsewhere")
+    assert status == 0, words
+    first = report(tmp_path / "elsewhere")["runs"][0]
+    assert first["row"]["slope"] is None
+    assert first["reasons"] == {
+        "slope": "e_40.h5 ends too early", "void": "?", "forgotten": "far does not give it",
+    }  # fmt: skip
+    row = rows(tmp_path / "elsewhere")[0]
+    assert (row["slope"], row["size"]) == ("", "1")
+    assert row["reasons"] == (
+        "slope: e_40.h5 ends too early; void: ?; forgotten: far does not give it"
+    )
+    assert "  no value\n    slope: e_40: e_40.h5 ends too early\n" in words
+    assert "    void: e_40, e_50, e_60: ?\n" in words
+    page = tmp_path / "report.html"
+    main(["report", "--results", str(tmp_path), "-o", str(page)])
+    assert "e_40.h5 ends too early" in page.read_text()
+
+
 def test_a_program_that_is_killed_counts_as_failed_and_is_tried_again(do, program, tmp_path):
     killed = 'case "$*" in --quiet*e_50*) kill -9 $$ ;; esac'
     status, words = do(program=stand_in(tmp_path / "other", program, before=killed))
@@ -531,7 +559,12 @@ def test_the_page_on_studies_names_every_measure_column_kind_and_option():
     for kind, own in FIGURE_OPTIONS.items():
         row = re.search(rf"^\| `{kind}` .*$", kinds, re.M).group()
         assert set(re.findall(r"`(\w+)`", row)) == {kind} | (set(own) - of_all)
-    assert set(re.findall(r"^\| `(\w+)` \|", options, re.M)) == set(OPTIONS)
+    forms = dict(re.findall(r"^\| `(\w+)` \| (.*?) \|", options, re.M))
+    assert set(forms) == set(OPTIONS)
+    for name, form in forms.items():
+        with pytest.raises(ValidationError) as caught:
+            FigureOptions.model_validate({name: object()})
+        assert [one.what for one in mistakes(caught.value)] == [f"must be {form}"], name
 
 
 def test_the_example_of_the_page_on_studies_works(program, tmp_path, monkeypatch, capsys):

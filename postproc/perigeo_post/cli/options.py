@@ -4,11 +4,28 @@ from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from ..read.errors import RequestError
+
 Arguments = argparse.Namespace
+
+
+@contextmanager
+def extra(name: str) -> Iterator[None]:
+    """Around the imports of a command whose packages are an extra of their own."""
+    try:
+        yield
+    except ModuleNotFoundError as error:
+        if (error.name or "perigeo_post").partition(".")[0] == "perigeo_post":
+            raise
+        raise RequestError(
+            f"perigeo-post {name} needs {error.name}, which is not installed; to install it, type "
+            f"in the folder of perigeo: {sys.executable} -m pip install './postproc[{name}]'"
+        ) from None
 
 
 def strain_value(text: str) -> float:

@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 from ..read.errors import OutputError, RequestError, ResultError
+from .options import extra
 
 STUDIES = Path("studies")  # where the study files are looked for
 DOCUMENT = Path("doc/verification.md")
@@ -35,8 +36,9 @@ def carry_out(args: argparse.Namespace) -> None:
     studies = args.studies or (STUDIES if STUDIES.is_dir() else None)
     if studies is not None and not studies.is_dir():
         raise RequestError(f"there is no folder {studies}")
-    from ..report.publish import publish
-    from ..report.write import write_report
+    with extra("report"):
+        from ..report.publish import publish
+        from ..report.write import write_report
 
     report = write_report(args.results, args.output, studies)
     print(f"wrote {report.path}")

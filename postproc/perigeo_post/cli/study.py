@@ -6,7 +6,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from .options import Arguments
+from .options import Arguments, extra
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -36,7 +36,8 @@ def _count(text: str) -> int:
 
 
 def carry_out(args: Arguments) -> int:
-    from ..study import run as study
+    with extra("study"):
+        from ..study import run as study
 
     options = study.StudyOptions(
         args.output, args.jobs, args.program, args.dry_run, args.redo, args.only, args.figures_only

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ..read.errors import OutputError, RequestError, ResultError
 from .data import DONE, FAILED, MISSING, Material, Study
-from .study import machine_text
+from .study import origin
 from .values import DASH, Line, headline, values_of
 
 BEGIN, END = "<!-- studies: begin -->", "<!-- studies: end -->"
@@ -32,12 +32,8 @@ def markdown_table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[s
 
 def provenance(material: Material) -> str:
     """With which program, on which machine and when, in one line."""
-    studies = material.studies
-    versions = sorted({version for study in studies for version in study.versions})
-    machines = sorted({machine_text(study.machine) for study in studies} - {""})
-    dates = sorted({study.created[:10] for study in studies if study.created})
-    period = " to ".join(dict.fromkeys((dates[0], dates[-1]))) if dates else ""
-    words = [*versions, *machines, period]
+    known = origin(material)
+    words = [*known.versions, *known.machines, known.period]
     return "Printed by `make report`, " + ", ".join(word for word in words if word) + ":"
 
 

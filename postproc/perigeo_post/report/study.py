@@ -1,132 +1,99 @@
-"""The part of the report that shows one study."""
+"""What the page shows of one study, with the files that the study names."""
 
 from __future__ import annotations
 
 import base64
 import io
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 from PIL import Image
 
 from ..read.errors import ResultError
 from ..study.types import Value
-from .data import (
-    AGREES,
-    DIFFERS,
-    DONE,
-    FAILED,
-    IN_PART,
-    MISSING,
-    NO_RESULT,
-    FigureRecord,
-    Finding,
-    RunRecord,
-    Study,
-    read_table,
-)
-from .html import (
-    Content,
-    Html,
-    box,
-    el,
-    escape,
-    facts_list,
-    join,
-    notice,
-    number_html,
-    paragraphs,
-)
-from .values import DASH, Values, cell, duration, headline, number, readable, values_of
+from .data import FAILED, MISSING, FigureRecord, Material, RunRecord, Study, read_table
+from .values import Values, headline, plural, readable, values_of
 
-CLASSES = {AGREES: "agrees", IN_PART: "in-part", DIFFERS: "differs", NO_RESULT: "no-result"}
 PIXELS_PER_INCH = 135.0  # on the screen: a figure of one column takes about half the text
 LONGEST_TABLE = 60  # rows of the numbers of a figure that the page shows
 WIDEST_TABLE = 12
 
 
-class StudySection:
-    """Builds the section; what a study names and cannot be read goes into `problems`."""
+@dataclass(frozen=True)
+class Picture:
+    """A figure as an address that holds it, and its size in the page [CSS pixels]."""
 
-    def __init__(
-        self,
-        study: Study,
-        failures: Mapping[tuple[str, str], str],
-        problems: list[str],
-        files: Mapping[str, str],
-    ) -> None:
+    source: str
+    width: int
+    height: int
+
+
+@dataclass(frozen=True)
+class ShownFigure:
+    """A figure with what could be read of it: the numbers themselves or a remark about them."""
+
+    record: FigureRecord
+    title: str
+    picture: Picture | None
+    head: Sequence[str] = ()
+    rows: Sequence[Sequence[str]] = ()
+    remark: str = ""
+
+
+@dataclass(frozen=True)
+class ShownValues:
+    """Measured values of one series: those of the first sight, and all."""
+
+    name: str
+    title: str
+    first: Values
+    all: Values
+
+
+class Section:
+    """One study; what it names and cannot be read is in `problems`."""
+
+    def __init__(self, study: Study, place: str, file: str) -> None:
         self.study = study
-        self.failures = failures  # places in the page, by study and run
-        self.problems = problems
-        self.files = files  # of the studies, by their names
-
-    def html(self, place: str) -> Html:
-        """The whole section, to be found at this place."""
-        study = self.study
-        source = el("code", study.file or study.name)
-        facts = [
-            ("Study", join([source, f" on {study.base}" if study.base else None])),
-            ("Program", "; ".join(study.versions) or DASH),
-            ("Computed", join_words(study.created[:10], machine_text(study.machine)) or DASH),
-            ("Time", f"{duration(study.seconds)} for {plural(len(study.runs), 'run')}"),
+        self.place = place
+        self.file = file  # of the study, to go on with it
+        self.problems: list[str] = []
+        self.figures = [self.figure(record) for record in study.figures]
+        self.values = [
+            values for name, title in study.series for values in self.series(name, title)
         ]
-        parts: list[Content] = [
-            el("h2", study.title),
-            paragraphs(study.question, "lead"),
-            facts_list(facts),
-            *self.notices(),
-        ]
-        if study.findings:
-            parts.append(el("h3", "Findings"))
-            parts += [self.finding(finding) for finding in study.findings]
-        if study.figures:
-            parts.append(el("h3", "Figures"))
-            parts += [self.figure(figure) for figure in study.figures]
-        parts += [self.values(), self.runs()]
-        return el("section", *parts, id=place)
+        self.inputs = self.shared_inputs()
+        self.failed = [run for run in study.runs if run.status == FAILED]
 
-    def notices(self) -> list[Html]:
-        """What is missing, and what went wrong when the study was put together."""
-        found = []
-        missing = self.study.count(MISSING)
-        if missing:
-            more = el("p", "To go on: ", self.again())
-            words = f"{missing} of {plural(len(self.study.runs), 'run')} missing."
-            found.append(notice(words, more, True))
-        if self.study.problems:
-            items = [el("li", problem) for problem in self.study.problems]
-            found.append(notice("Not everything could be measured or drawn:", el("ul", *items)))
-        return found
+    def name(self, run: RunRecord) -> str:
+        """The label of a run, after its series where there are several."""
+        title = dict(self.study.series).get(run.series) or readable(run.series)
+        return f"{title}: {run.label}" if len(self.study.series) > 1 else run.label
 
-    def again(self) -> Html:
-        """The command that goes on with the study."""
-        file = self.files.get(self.study.name) or self.study.file or self.study.name
-        return el("code", f"perigeo-post study {file}")
+    def meanings(self) -> list[tuple[str, str]]:
+        """What the measured quantities mean."""
+        found = {line.name: line.description for one in self.values for line in one.all.lines}
+        return [(name, text) for name, text in found.items() if text]
 
-    def finding(self, finding: Finding) -> Html:
-        facts: list[tuple[str, Content]] = [
-            ("The paper says", finding.paper or DASH),
-            ("We find", finding.found or DASH),
-            ("Verdict", verdict_mark(finding)),
-        ]
-        words = {True: "holds", False: "does not hold", None: "no data"}
-        criteria = [join([el("code", text), f" {words[holds]}"]) for text, holds in finding.holds]
-        if criteria:
-            facts.append(("Criteria", join(criteria, "; ")))
-        return el("div", el("h4", finding.title), facts_list(facts), paragraphs(finding.note),
-                  class_="finding")  # fmt: skip
-
-    def figure(self, figure: FigureRecord) -> Html:
-        title = figure.title or readable(figure.name)
-        caption: list[Content] = [el("p", el("b", title))]
-        caption.append(paragraphs(figure.caption))
-        picture = self.picture(figure)
-        if figure.csv:
-            caption.append(self.numbers(figure, title))
-        return el("figure", picture, el("figcaption", *caption))
-
-    def picture(self, figure: FigureRecord) -> Html:
+    def figure(self, record: FigureRecord) -> ShownFigure:
+        title = record.title or readable(record.name)
+        picture = self.picture(record)
+        if not record.csv:
+            return ShownFigure(record, title, picture)
         try:
-            path = self.study.inside(figure.png)
+            head, rows = read_table(self.study.inside(record.csv))
+        except ResultError as error:
+            self.problems.append(str(error))
+            remark = f"The numbers, {record.csv}, are missing or cannot be read."
+            return ShownFigure(record, title, picture, remark=remark)
+        if len(rows) > LONGEST_TABLE or len(head) > WIDEST_TABLE:
+            remark = f"The numbers in it: {record.csv} ({plural(len(rows), 'row')})."
+            return ShownFigure(record, title, picture, remark=remark)
+        return ShownFigure(record, title, picture, [readable(name) for name in head], rows)
+
+    def picture(self, record: FigureRecord) -> Picture | None:
+        try:
+            path = self.study.inside(record.png)
             try:
                 data = path.read_bytes()
                 with Image.open(io.BytesIO(data)) as image:
@@ -140,111 +107,36 @@ class StudySection:
                 raise ResultError(f"{path}: {reason}") from error
         except ResultError as error:
             self.problems.append(str(error))
-            return notice(f"The figure {figure.png} is missing or cannot be read.", None, True)
+            return None
         scale = PIXELS_PER_INCH / density
-        source = "data:image/png;base64," + base64.b64encode(data).decode("ascii")
-        return el("img", src=source, alt=" ".join(figure.alt.split()),
-                  width=max(1, round(width * scale)),
-                  height=max(1, round(height * scale)))  # fmt: skip
-
-    def numbers(self, figure: FigureRecord, title: str) -> Html:
-        """The numbers drawn, where they are few; else the name of their file."""
-        try:
-            head, rows = read_table(self.study.inside(figure.csv))
-        except ResultError as error:
-            self.problems.append(str(error))
-            return el("p", f"The numbers, {figure.csv}, are missing or cannot be read.",
-                      class_="small soft")  # fmt: skip
-        if len(rows) > LONGEST_TABLE or len(head) > WIDEST_TABLE:
-            words = f"The numbers in it: {figure.csv} ({plural(len(rows), 'row')})."
-            return el("p", words, class_="small soft")
-        heads = [el("th", readable(name), scope="col", class_="n") for name in head]
-        lines = [el("tr", *[el("td", csv_cell(text), class_="n") for text in row]) for row in rows]
-        table = el("table", el("thead", el("tr", *heads)), el("tbody", *lines))
-        return el("details", el("summary", "Numbers in this figure"),
-                  box(table, f"Numbers in the figure {title}"))  # fmt: skip
-
-    def values(self) -> Html | None:
-        parts: list[Content] = []
-        described: dict[str, str] = {}
-        for name, title in self.study.series:
-            values = values_of(self.study, self.study.runs_of(name))
-            if not values.lines:
-                continue
-            if len(self.study.series) > 1:
-                parts.append(el("h4", title or readable(name) or "Runs"))
-            label = f"Measured values: {title or self.study.title}"
-            first = headline(values, self.study.runs)
-            parts.append(box(values_table(first), label))
-            if len(first.lines) < len(values.lines):
-                words = f"All {len(values.lines)} quantities"
-                parts.append(el("details", el("summary", words),
-                                box(values_table(values), label + ", all")))  # fmt: skip
-            if values.without:
-                words = "Without a value in these runs: " + ", ".join(values.without) + "."
-                parts.append(el("p", words, class_="small soft"))
-            described.update({line.name: line.description for line in values.lines})
-        if not parts:
-            return None
-        items = [(name, text) for name, text in described.items() if text]
-        if items:
-            parts.append(el("details", el("summary", "What the quantities mean"),
-                            facts_list(items)))  # fmt: skip
-        if self.study.csv:
-            words = f"All values in SI units: {self.study.csv}."
-            parts.append(el("p", words, class_="small soft"))
-        return join([el("h3", "Measured values"), *parts])
-
-    # ---- the runs of a study ----------------------------------------------------------------
-
-    def runs(self) -> Html | None:
-        if not self.study.runs:
-            return None
-        names = ("Run", "State", "Points", "Steps", "Threads", "Time", "Program", "Input")
-        numeric = ("Points", "Steps", "Threads", "Time")
-        heads = [el("th", n, scope="col", class_="n" if n in numeric else None) for n in names]
-        bodies = []
-        for name, title in self.study.series:
-            lines = []
-            if len(self.study.series) > 1:
-                head = el("th", title or readable(name), colspan=len(names), scope="rowgroup")
-                lines.append(el("tr", head, class_="group"))
-            lines += [run_line(run) for run in self.study.runs_of(name)]
-            bodies.append(el("tbody", *lines))
-        table = el("table", el("thead", el("tr", *heads)), *bodies)
-        failures = [self.failure(run) for run in self.study.runs if run.status == FAILED]
-        return join(
-            [el("h3", "Runs"), *failures, box(table, f"Runs: {self.study.title}"), self.inputs()]
+        return Picture(
+            "data:image/png;base64," + base64.b64encode(data).decode("ascii"),
+            max(1, round(width * scale)),
+            max(1, round(height * scale)),
         )
 
-    def failure(self, run: RunRecord) -> Html:
-        status = f" with exit status {run.exit_status}" if run.exit_status is not None else ""
-        message = el("pre", run.message.strip() or "No message.")
-        return el("div", el("p", f"{run_name(self.study, run)}: failed{status}."), message,
-                  class_="notice", id=self.failures[self.study.name, run.id])  # fmt: skip
+    def series(self, name: str, title: str) -> list[ShownValues]:
+        """The values of a series; nothing where there are none."""
+        values = values_of(self.study, self.study.runs_of(name))
+        first = headline(values, self.study.runs)
+        return [ShownValues(name, title, first, values)] if values.lines else []
 
-    def inputs(self) -> Html | None:
-        """The namelists of the runs, folded; one that several runs share stands there once."""
-        texts: dict[str, Html] = {}
+    def shared_inputs(self) -> list[tuple[list[str], str]]:
+        """The namelists of the runs, each once, with the names of the runs that share it."""
+        texts: dict[str, str] = {}
         names: dict[str, list[str]] = {}
         for run in self.study.runs:
-            text = texts.get(run.input) or self.input(run)
+            text = texts[run.input] if run.input in texts else self.input(run)
             if text is not None:
                 texts[run.input] = text
-                names.setdefault(run.input, []).append(run_name(self.study, run))
-        if not texts:
-            return None
-        parts = [
-            el("details", el("summary", "; ".join(names[path])), text)
-            for path, text in texts.items()
-        ]
-        return el("details", el("summary", f"Inputs of the runs ({len(parts)})"), *parts)
+                names.setdefault(run.input, []).append(self.name(run))
+        return [(names[path], text) for path, text in texts.items()]
 
-    def input(self, run: RunRecord) -> Html | None:
+    def input(self, run: RunRecord) -> str | None:
         if not run.input:
             return None
         try:
-            return el("pre", self.study.inside(run.input).read_text(encoding="utf-8").rstrip())
+            return self.study.inside(run.input).read_text(encoding="utf-8").rstrip()
         except FileNotFoundError:
             # A run that was never started may have no input yet.
             if run.status != MISSING:
@@ -256,52 +148,24 @@ class StudySection:
         return None
 
 
-def verdict_mark(finding: Finding) -> Html:
-    return el("span", finding.verdict, class_=f"verdict {CLASSES[finding.verdict]}")
+@dataclass(frozen=True)
+class Origin:
+    """With which versions of the program, on which machines and when all was computed."""
+
+    versions: Sequence[str]
+    machines: Sequence[str]
+    period: str  # empty where it is not known
 
 
-def state_mark(run: RunRecord) -> Html:
-    shape = {DONE: "agrees", FAILED: "differs", MISSING: "no-result"}[run.status]
-    return el("span", run.status, class_=f"verdict {shape}")
-
-
-def run_line(run: RunRecord) -> Html:
-    """A run in the table of runs."""
-    counts = (cell(run.points), cell(run.steps), cell(run.threads), duration(run.seconds))
-    return el(
-        "tr",
-        el("th", run.label, scope="row"),
-        el("td", state_mark(run)),
-        *[el("td", text, class_="n") for text in counts],
-        el("td", run.program_version or DASH, class_="w"),
-        el("td", el("code", run.input_sha256[:12]) if run.input_sha256 else DASH),
+def origin(material: Material) -> Origin:
+    """Where the results come from."""
+    studies = material.studies
+    dates = sorted(study.created[:10] for study in studies if study.created)
+    return Origin(
+        versions=sorted({version for study in studies for version in study.versions}),
+        machines=sorted({machine_text(study.machine) for study in studies} - {""}),
+        period=" to ".join(dict.fromkeys((dates[0], dates[-1]))) if dates else "",
     )
-
-
-def run_name(study: Study, run: RunRecord) -> str:
-    """The label of a run, after its series where there are several."""
-    title = dict(study.series).get(run.series) or readable(run.series)
-    return f"{title}: {run.label}" if len(study.series) > 1 else run.label
-
-
-def values_table(values: Values) -> Html:
-    """Quantities down, runs across."""
-    heads = [el("th", "Quantity", scope="col")]
-    heads += [el("th", label, scope="col", class_="n") for label in values.labels]
-    lines = []
-    for line in values.lines:
-        unit = el("span", f" {line.unit}", class_="unit") if line.unit else None
-        cells = [el("td", number_html(text), class_="n") for text in line.cells]
-        lines.append(el("tr", el("th", line.name, unit, scope="row"), *cells))
-    return el("table", el("thead", el("tr", *heads)), el("tbody", *lines), class_="values")
-
-
-def csv_cell(text: str) -> Html:
-    """A number of a CSV file with fewer digits; other text as it is."""
-    try:
-        return number_html(number(float(text), 5))
-    except ValueError:
-        return escape(text or DASH)
 
 
 def machine_text(machine: Mapping[str, Value]) -> str:
@@ -313,11 +177,3 @@ def machine_text(machine: Mapping[str, Value]) -> str:
         str(machine.get("system") or ""),
     ]
     return ", ".join(word for word in words if word)
-
-
-def join_words(*words: str) -> str:
-    return ", ".join(word for word in words if word)
-
-
-def plural(count: int, word: str) -> str:
-    return f"{count} {word}" if count == 1 else f"{count} {word}s"

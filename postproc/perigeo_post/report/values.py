@@ -114,6 +114,11 @@ def duration(seconds: float | None) -> str:
     return f"{hours} h {minutes:02d} min"
 
 
+def plural(count: int, word: str) -> str:
+    """So many of something."""
+    return f"{count} {word}" if count == 1 else f"{count} {word}s"
+
+
 def readable(column: str) -> str:
     """The name of a column as words."""
     return column.replace("_", " ")

@@ -12,7 +12,7 @@ from pathlib import Path
 from ..read.errors import OutputError, RequestError
 from .check import LARGE, check_report
 from .data import FAILED, MISSING, Material, gather
-from .page import Page
+from .page import page_html
 
 
 @dataclass(frozen=True)
@@ -62,12 +62,11 @@ def write_report(
         raise RequestError(
             f"{results} holds no study; 'make figures' or 'perigeo-post study FILE' makes them"
         )
-    page = Page(material)
-    text = page.html()
+    text, unreadable = page_html(material)
     try:
         output.parent.mkdir(parents=True, exist_ok=True)
         output.write_text(text, encoding="utf-8")
     except OSError as error:
         raise OutputError(f"cannot write {output}: {error.strerror or error}") from error
     size = len(text.encode("utf-8"))
-    return Report(output, material, page.problems, check_report(output), size)
+    return Report(output, material, unreadable, check_report(output), size)

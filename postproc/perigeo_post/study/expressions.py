@@ -1,8 +1,7 @@
 """Expressions in study files: arithmetic on the parameters of a run, or on the table of runs.
 
-Only what stands in `_OPERATORS`, `FUNCTIONS` and `TABLE_FUNCTIONS` is understood; a text is parsed
-once, checked as a whole, and then evaluated for as many runs as there are. Nothing of Python's own
-`eval` is used.
+simpleeval evaluates them. Which forms, operators and functions there are is listed here; a text is
+parsed once, checked as a whole, and then evaluated for as many runs as there are.
 """
 
 from __future__ import annotations
@@ -13,12 +12,14 @@ import math
 import operator
 import statistics
 from collections.abc import Iterable, Iterator, Mapping
+from functools import partial, reduce
 from typing import Any, Callable
+
+from simpleeval import EvalWithCompoundTypes, InvalidExpression, safe_power
 
 from ..read.errors import RequestError
 
 LONGEST = 2000  # characters of an expression
-LARGEST_POWER = 1000.0  # bits of the result of a power of whole numbers
 
 
 class ExpressionError(RequestError):
@@ -49,6 +50,9 @@ class Numbers:
 
     def __len__(self) -> int:
         return len(self.by_run)
+
+    def __getitem__(self, place: int) -> Any:
+        return self.values[place]
 
     @property
     def values(self) -> list[Any]:
@@ -84,33 +88,25 @@ def _arithmetic(function: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any
         for value in (left, right):
             if not isinstance(value, (int, float)):
                 raise ExpressionError(f"{_shown(value)} is no number")
-        return function(left, right)
+        result = function(left, right)
+        if isinstance(result, complex):
+            raise ExpressionError(f"{left} to the power of {right} is no real number")
+        return result
 
     return _both(apply)
 
 
-def _power(base: Any, exponent: Any) -> Any:
-    if isinstance(base, int) and isinstance(exponent, int) and exponent > 0:
-        if base.bit_length() * exponent > LARGEST_POWER:
-            raise ExpressionError("a power is too large")
-    elif base == 0 and exponent < 0:
-        raise ZeroDivisionError
-    result = base**exponent
-    if isinstance(result, complex):
-        raise ExpressionError(f"{base} to the power of {exponent} is no real number")
-    return result
-
-
-_OPERATORS: dict[type, Callable[[Any, Any], Any]] = {
+_OPERATORS: dict[type[ast.AST], Callable[..., Any]] = {
     ast.Add: _arithmetic(operator.add),
     ast.Sub: _arithmetic(operator.sub),
     ast.Mult: _arithmetic(operator.mul),
     ast.Div: _arithmetic(operator.truediv),
     ast.FloorDiv: _arithmetic(operator.floordiv),
     ast.Mod: _arithmetic(operator.mod),
-    ast.Pow: _arithmetic(_power),
-}
-_COMPARISONS: dict[type, Callable[[Any, Any], Any]] = {
+    ast.Pow: _arithmetic(safe_power),
+    ast.UAdd: partial(_arithmetic(operator.mul), 1),
+    ast.USub: partial(_arithmetic(operator.mul), -1),
+    ast.Not: operator.not_,
     ast.Eq: _both(operator.eq),
     ast.NotEq: _both(operator.ne),
     ast.Lt: _both(operator.lt),
@@ -132,8 +128,8 @@ def _shown(value: Any) -> str:
 def _listed(value: Any) -> list[Any]:
     if isinstance(value, Numbers):
         return value.values
-    if isinstance(value, list):
-        return value
+    if isinstance(value, (list, tuple)):
+        return list(value)
     raise ExpressionError(f"a list is needed, not {_shown(value)}")
 
 
@@ -217,11 +213,24 @@ CONSTANTS: dict[str, Any] = {"pi": math.pi}
 
 # ---- an expression ---------------------------------------------------------------------------
 
-_PLAIN = (
-    ast.Expression, ast.BinOp, ast.UnaryOp, ast.BoolOp, ast.Compare, ast.IfExp, ast.Name,
-    ast.Constant, ast.List, ast.Tuple, ast.Call, ast.keyword, ast.Subscript,
-    ast.Load, ast.USub, ast.UAdd, ast.Not, ast.And, ast.Or, *_OPERATORS, *_COMPARISONS,
+_FORMS = (
+    ast.BinOp, ast.UnaryOp, ast.BoolOp, ast.Compare, ast.IfExp, ast.Name, ast.Constant, ast.List,
+    ast.Tuple, ast.Call, ast.keyword, ast.Subscript, ast.Load, ast.And, ast.Or, *_OPERATORS,
 )  # fmt: skip
+
+
+class _Evaluator(EvalWithCompoundTypes):  # type: ignore[misc]
+    """simpleeval, where a chain like 1 < x <= 2 of lists gives a list."""
+
+    def __init__(self, names: Mapping[str, Any], functions: Mapping[str, Any]) -> None:
+        super().__init__(_OPERATORS, dict(functions), {**CONSTANTS, **names})
+        self.nodes[ast.Compare] = self._chain
+
+    def _chain(self, node: ast.Compare) -> Any:
+        sides = [self._eval(part) for part in (node.left, *node.comparators)]
+        pairs = zip(node.ops, sides, sides[1:])
+        found = [_OPERATORS[type(kind)](left, right) for kind, left, right in pairs]
+        return reduce(_both(lambda one, other: bool(one and other)), found)
 
 
 class Expression:
@@ -232,59 +241,47 @@ class Expression:
         if len(self.text) > LONGEST:
             raise ExpressionError(f"the expression has more than {LONGEST} characters")
         try:
-            self._tree = ast.parse(self.text, mode="eval")
+            self._tree = ast.parse(self.text, mode="eval").body
         except SyntaxError as error:
             raise ExpressionError(f"'{self.text}' is no expression: {error.msg}") from None
         except (ValueError, MemoryError, RecursionError):
             raise ExpressionError(f"'{self.text}' is no expression") from None
-        self.names: list[str] = []
-        self.calls: list[ast.Call] = []
-        try:
-            self._look_through(self._tree.body)
-        except RecursionError:
-            raise ExpressionError("the expression is nested too deeply") from None
+        nodes = list(ast.walk(self._tree))
+        self.calls = [node for node in nodes if isinstance(node, ast.Call)]
+        for node in nodes:
+            self._allow(node)
+        functions = [call.func for call in self.calls]
+        self.names = [
+            node.id for node in nodes if isinstance(node, ast.Name) and node not in functions
+        ]
 
-    def _look_through(self, node: ast.AST) -> None:
-        if not isinstance(node, _PLAIN):
-            kind = type(node).__name__
-            raise ExpressionError(f"'{self.text}': not allowed in an expression: {kind}")
+    def _allow(self, node: ast.AST) -> None:
+        """Raise unless this part of the expression is one that the language has."""
+        if isinstance(node, ast.Call) and (
+            not isinstance(node.func, ast.Name) or any(k.arg is None for k in node.keywords)
+        ):
+            raise ExpressionError(f"'{self.text}': only plain calls of functions are allowed")
+        found = "" if isinstance(node, _FORMS) else type(node).__name__
         if isinstance(node, ast.Constant) and not isinstance(
             node.value, (bool, int, float, str, type(None))
         ):
-            raise ExpressionError(f"'{self.text}': not allowed in an expression: {node.value!r}")
-        if isinstance(node, ast.Call):
-            if not isinstance(node.func, ast.Name) or any(k.arg is None for k in node.keywords):
-                raise ExpressionError(f"'{self.text}': only plain calls of functions are allowed")
-            self.calls.append(node)
-            for part in [*node.args, *node.keywords]:
-                self._look_through(part)
-            return
-        if isinstance(node, ast.Name):
-            self.names.append(node.id)
-        for part in ast.iter_child_nodes(node):
-            self._look_through(part)
+            found = repr(node.value)
+        if found:
+            raise ExpressionError(f"'{self.text}': not allowed in an expression: {found}")
 
     def check_names(self, names: Iterable[str], functions: Iterable[str]) -> None:
         """Raise for a name or a function that will not be there."""
-        known = [*names, *CONSTANTS]
-        for name in self.names:
-            if name not in known:
-                raise ExpressionError(
-                    f"'{self.text}': unknown name {name}{nearest(name, known)}; "
-                    f"allowed: {', '.join(known)}"
-                )
-        known = sorted(functions)
-        for name in self.called:
-            if name not in known:
-                raise ExpressionError(
-                    f"'{self.text}': unknown function {name}{nearest(name, known)}; "
-                    f"allowed: {', '.join(known)}"
-                )
-
-    @property
-    def called(self) -> list[str]:
-        """Names of the functions that are called."""
-        return [call.func.id for call in self.calls if isinstance(call.func, ast.Name)]
+        called = [call.func.id for call in self.calls if isinstance(call.func, ast.Name)]
+        for what, used, known in (
+            ("name", self.names, [*names, *CONSTANTS]),
+            ("function", called, sorted(functions)),
+        ):
+            for name in used:
+                if name not in known:
+                    raise ExpressionError(
+                        f"'{self.text}': unknown {what} {name}{nearest(name, known)}; "
+                        f"allowed: {', '.join(known)}"
+                    )
 
     def value(
         self,
@@ -294,77 +291,19 @@ class Expression:
         """What the expression gives with these names and functions."""
         self.check_names(names, functions)
         try:
-            result = _evaluate(self._tree.body, {**CONSTANTS, **names}, functions)
+            result = _Evaluator(names, functions).eval(self.text, self._tree)
         except ZeroDivisionError:
             raise ExpressionError(f"'{self.text}': division by zero") from None
         except OverflowError:
             raise ExpressionError(f"'{self.text}': a number is too large") from None
-        except (ExpressionError, MissingValueError) as error:
-            raise type(error)(f"'{self.text}': {error}") from None
-        except (TypeError, ValueError, IndexError, KeyError) as error:
+        except RecursionError:
+            raise ExpressionError("the expression is nested too deeply") from None
+        except MissingValueError as error:
+            raise MissingValueError(f"'{self.text}': {error}") from None
+        except (
+            ExpressionError, InvalidExpression, TypeError, ValueError, IndexError, KeyError,
+        ) as error:  # fmt: skip
             raise ExpressionError(f"'{self.text}': {error}") from None
         if isinstance(result, float) and not math.isfinite(result):
             raise ExpressionError(f"'{self.text}' is no finite number")
         return result
-
-
-def _evaluate(
-    node: ast.AST, names: Mapping[str, Any], functions: Mapping[str, Callable[..., Any]]
-) -> Any:
-    def of(part: ast.AST) -> Any:
-        return _evaluate(part, names, functions)
-
-    if isinstance(node, ast.Constant):
-        return node.value
-    if isinstance(node, ast.Name):
-        return names[node.id]
-    if isinstance(node, (ast.List, ast.Tuple)):
-        return [of(item) for item in node.elts]
-    if isinstance(node, ast.BinOp):
-        return _OPERATORS[type(node.op)](of(node.left), of(node.right))
-    if isinstance(node, ast.UnaryOp):
-        value = of(node.operand)
-        if isinstance(node.op, ast.Not):
-            return not value
-        return _arithmetic(operator.mul)(-1 if isinstance(node.op, ast.USub) else 1, value)
-    if isinstance(node, ast.BoolOp):
-        stops_at = isinstance(node.op, ast.Or)
-        value = None
-        for part in node.values:
-            value = of(part)
-            if bool(value) == stops_at:
-                break
-        return value
-    if isinstance(node, ast.IfExp):
-        return of(node.body) if of(node.test) else of(node.orelse)
-    if isinstance(node, ast.Subscript):
-        place = of(node.slice)
-        if not isinstance(place, int):
-            raise ExpressionError("only a whole number may stand in [ ]")
-        items = _listed(of(node.value))
-        if not -len(items) <= place < len(items):
-            raise MissingValueError(f"there is no value number {place}")
-        return items[place]
-    if isinstance(node, ast.Compare):
-        return _compare(node, of)
-    assert isinstance(node, ast.Call)
-    assert isinstance(node.func, ast.Name)
-    keywords = {str(k.arg): of(k.value) for k in node.keywords}
-    return functions[node.func.id](*[of(part) for part in node.args], **keywords)
-
-
-def _compare(node: ast.Compare, of: Callable[[ast.AST], Any]) -> Any:
-    """A chain like 1 < x <= 2; one of lists gives a list."""
-    left = of(node.left)
-    result: Any = True
-    for kind, part in zip(node.ops, node.comparators):
-        right = of(part)
-        found = _COMPARISONS[type(kind)](left, right)
-        if isinstance(found, Numbers) or isinstance(result, Numbers):
-            result = _both(lambda a, b: bool(a and b))(result, found)
-        else:
-            result = found
-            if not found:
-                return False
-        left = right
-    return result

@@ -12,22 +12,13 @@ from pathlib import Path
 from typing import Any
 
 from .expressions import nearest
-from .findings import Finding, read_finding
-from .level import COUNTED, FIXED, Level, read_level
+from .findings import Finding, Known, checked_finding
+from .level import Level, level_of
 from .namelist import Namelist, NamelistError, parse_namelist
-from .options import check_options
 from .plan import PlannedRun, Planner, has_frame
-from .toml import Table, read_toml
+from .tables import COUNTED, FIGURE_KEYS, FIXED, LAST, StudyTable, read_tables
+from .toml import Key, Problems, StudyError, read_toml
 from .types import Column, Draw, Measure
-
-_TOP = (
-    "name", "title", "question", "base", "strain", "line", "measures", "label",
-    "tension_positive", "units", "parameters", "set", "case", "series", "figure", "finding",
-)  # fmt: skip
-_SERIES = (
-    "name", "title", "strain", "line", "measures", "label", "parameters", "set", "case",
-)  # fmt: skip
-_FIGURE = ("name", "kind", "title", "caption", "alt", "series")
 
 
 @dataclass(frozen=True)
@@ -74,37 +65,35 @@ class Study:
 def load_study(path: Path, kinds: Kinds) -> Study:
     """Read a study file. Raises StudyError with everything that is wrong."""
     data, problems = read_toml(path)
-    top = Table(data, (), problems)
-    top.only(_TOP)
-    name = top.name("name")
-    title = top.text("title", name)
-    base_path, base = _base(top, path)
-    series, levels = _all_series(top, kinds, name, title)
+    top = read_tables(data, problems)
+    if top is None:
+        raise StudyError(problems.list)
+    base_path, base = _base(top, path, problems)
+    levels = _levels(top, kinds, problems)
     planner = Planner(base or Namelist(), [base_path.parent, path.parent, Path()], problems)
     if base is not None:
-        for (one, _), level in zip(series, levels):
-            planner.add_series(one, level, one if level.table.place else "", name)
+        for name, level in levels.items():
+            planner.add_series(name, level, name if level.place else "", top.name)
     runs = planner.runs
 
-    parameters = list(dict.fromkeys(name for level in levels for name in level.parameters))
-    columns = _columns(top, parameters, levels, kinds)
-    names = [one for one, _ in series]
+    parameters = list(dict.fromkeys(name for level in levels.values() for name in level.parameters))
+    columns = _columns(top, parameters, list(levels.values()), kinds, problems)
     complete = not problems.list  # otherwise there may be fewer runs than meant
-    figures = _figures(top, names, runs if complete else [], columns, kinds)
+    figures = _figures(top, list(levels), runs if complete else [], columns, kinds, problems)
+    known = Known(list(levels), parameters, runs if complete else None, columns)
     findings = [
         found
-        for table in top.tables("finding")
-        if (found := read_finding(table, names, parameters, runs if complete else None, columns))
-        is not None
+        for k, table in enumerate(top.finding)
+        if (found := checked_finding(table, ("finding", k), known, problems)) is not None
     ]
     problems.stop_if_any()
     return Study(
         path=path,
-        name=name,
-        title=title,
-        question=top.text("question"),
+        name=top.name,
+        title=top.title or top.name,
+        question=top.question,
         base=base_path,
-        series=tuple(series),
+        series=tuple((name, level.title) for name, level in levels.items()),
         runs=tuple(runs),
         figures=tuple(figures),
         findings=tuple(findings),
@@ -113,107 +102,95 @@ def load_study(path: Path, kinds: Kinds) -> Study:
     )
 
 
-def _base(top: Table, path: Path) -> tuple[Path, Namelist | None]:
-    name = top.text("base", required=True)
-    base = path.parent / name
-    if not name:
+def _base(top: StudyTable, path: Path, problems: Problems) -> tuple[Path, Namelist | None]:
+    base = path.parent / top.base
+    if not top.base:
         return base, None
     try:
         return base, parse_namelist(base.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
         reason = error.strerror if isinstance(error, OSError) else "it is not a text"
-        top.complain("base", f"the base cannot be read: {reason}", name, "relative to this file")
+        what = f"the base cannot be read: {reason}"
+        problems.add(("base",), what, top.base, "relative to this file")
     except NamelistError as error:
-        top.complain("base", f"the base has a mistake: {error}", name)
+        problems.add(("base",), f"the base has a mistake: {error}", top.base)
     return base, None
 
 
-def _all_series(
-    top: Table, kinds: Kinds, name: str, title: str
-) -> tuple[list[tuple[str, str]], list[Level]]:
-    """Names, titles and contents of the series; the file itself is one where it names none."""
-    level = read_level(top, kinds.measures)
-    tables = top.tables("series")
-    if not tables:
-        return [(name, title)], [level]
-    series: list[tuple[str, str]] = []
-    levels: list[Level] = []
-    for table in tables:
-        table.only(_SERIES)
-        one = table.name("name")
-        if one in [other for other, _ in series]:
-            table.complain("name", "two series have the same name", one)
-        series.append((one, table.text("title", one)))
-        levels.append(read_level(table, kinds.measures).below(level))
-    return series, levels
+def _levels(top: StudyTable, kinds: Kinds, problems: Problems) -> dict[str, Level]:
+    """Contents of the series by their names; the file itself is one where it names none."""
+    whole = level_of(top, (), top.name)
+    whole.measures = problems.known(("measures",), whole.measures, kinds.measures, "measure")
+    if not top.series:
+        return {top.name: whole}
+    levels: dict[str, Level] = {}
+    for k, table in enumerate(top.series):
+        if table.name in levels:
+            problems.add(("series", k, "name"), "two series have the same name", table.name)
+        level = level_of(table, ("series", k), table.name)
+        place = level.at("measures")
+        level.measures = problems.known(place, level.measures, kinds.measures, "measure")
+        levels[table.name] = level.below(whole)
+    return levels
 
 
-# ---- columns and figures ------- --------------------------------------------------------------
+# ---- columns and figures ---------------------------------------------------------------------
 
 
 def _columns(
-    top: Table, parameters: list[str], levels: Sequence[Level], kinds: Kinds
+    top: StudyTable,
+    parameters: list[str],
+    levels: Sequence[Level],
+    kinds: Kinds,
+    problems: Problems,
 ) -> dict[str, Column]:
-    units = top.table("units")
     columns = dict(FIXED)
     for name in parameters:
-        columns[name] = Column(units.text(name), f"parameter {name}")
-    for key in units.data:
+        columns[name] = Column(top.units.get(name, ""), f"parameter {name}")
+    for key in top.units:
         if key not in parameters:
-            units.complain(key, f"there is no such parameter{nearest(key, parameters)}",
-                           allowed=parameters)  # fmt: skip
+            what = f"there is no such parameter{nearest(key, parameters)}"
+            problems.add(("units", key), what, allowed=parameters)
     columns.update(COUNTED)
     for measure in dict.fromkeys(name for level in levels for name in level.measures):
         for name, column in kinds.measures[measure].columns.items():
             if name in parameters or name in FIXED:
-                top.complain("measures", f"'{measure}' gives a column '{name}', which is there")
+                what = f"'{measure}' gives a column '{name}', which is there"
+                problems.add(("measures",), what)
             columns.setdefault(name, column)
+    columns.update(LAST)
     return columns
 
 
 def _figures(
-    top: Table,
+    top: StudyTable,
     series: list[str],
     runs: Sequence[PlannedRun],
     columns: Mapping[str, Column],
     kinds: Kinds,
+    problems: Problems,
 ) -> list[FigureSpec]:
     found: list[FigureSpec] = []
-    turned = top.boolean("tension_positive", False)
-    for table in top.tables("figure"):
-        name = table.name("name")
-        if name in [other.name for other in found] or name == top.data.get("name"):
-            table.complain("name", "the name is taken", name)
-        kind = table.text("kind", required=True)
-        if kind and kind not in kinds.figures:
-            table.complain(
-                "kind", f"unknown kind of figure{nearest(kind, kinds.figures)}", kind,
-                sorted(kinds.figures),
-            )  # fmt: skip
-        options = {key: value for key, value in table.data.items() if key not in _FIGURE}
-        known = kinds.options.get(kind)
-        if known is not None:
-            table.only([*_FIGURE, *sorted(known)])
-            if "tension_positive" in known:
-                options.setdefault("tension_positive", turned)
-        check_options(table, options)
-        for key in kinds.needed.get(kind, ()):
-            if key not in options:
-                table.problems.add(table.place, f"the key {key} is missing")
-        for key in kinds.columns.get(kind, ()):
-            if isinstance(options.get(key), (str, list)):
-                table.choices(key, columns, "column")
-        if isinstance(options.get("only"), Mapping):
-            table.table("only").only(columns)
-        chosen = table.choices("series", series, "series") or series
-        _check_strains(table, [run for run in runs if run.series in chosen])
+    for k, table in enumerate(top.figure):
+        place: Key = ("figure", k)
+        if table.name in [top.name, *(other.name for other in found)]:
+            problems.add((*place, "name"), "the name is taken", table.name)
+        if table.kind:
+            one = [table.kind]
+            problems.known((*place, "kind"), one, sorted(kinds.figures), "kind of figure")
+        options = table.options()
+        _check_options(table.kind, options, place, columns, kinds, problems)
+        if "tension_positive" in kinds.options.get(table.kind, ()):
+            options.setdefault("tension_positive", top.tension_positive)
+        chosen = problems.known((*place, "series"), table.series, series, "series") or series
+        _check_strains(options, place, [run for run in runs if run.series in chosen], problems)
         found.append(
             FigureSpec(
-                name=name,
-                kind=kind,
-                title=table.text("title", required=True),
-                caption=table.text("caption"),
-                alt=table.text("alt", required=True),
+                name=table.name,
+                kind=table.kind,
+                title=table.title,
+                caption=table.caption,
+                alt=table.alt,
                 series=tuple(chosen),
                 options=options,
             )
@@ -221,13 +198,42 @@ def _figures(
     return found
 
 
-def _check_strains(table: Table, runs: Sequence[PlannedRun]) -> None:
+def _check_options(
+    kind: str,
+    options: Mapping[str, Any],
+    place: Key,
+    columns: Mapping[str, Column],
+    kinds: Kinds,
+    problems: Problems,
+) -> None:
+    """Complain about options that the kind has not, needs, or that name columns not there."""
+    if kind in kinds.options:
+        known = [*FIGURE_KEYS, *sorted(kinds.options[kind])]
+        for key in options:
+            if key not in known:
+                problems.add((*place, key), f"unknown key{nearest(key, known)}", allowed=known)
+    for key in kinds.needed.get(kind, ()):
+        if key not in options:
+            problems.add(place, f"the key {key} is missing")
+    for key in kinds.columns.get(kind, ()):
+        value = options.get(key, [])
+        names = [value] if isinstance(value, str) else value
+        if isinstance(names, list):
+            problems.known((*place, key), names, columns, "column")
+    for key in options.get("only", {}):
+        if key not in columns:
+            what = f"unknown key{nearest(key, columns)}"
+            problems.add((*place, "only", key), what, allowed=columns)
+
+
+def _check_strains(
+    options: Mapping[str, Any], place: Key, runs: Sequence[PlannedRun], problems: Problems
+) -> None:
     """The option `strain` of a figure needs frames there."""
-    strains = table.data.get("strain", [])
+    strains = options.get("strain", [])
     for strain in strains if isinstance(strains, list) else [strains]:
-        if isinstance(strain, bool) or not isinstance(strain, (int, float)) or not runs:
-            continue
         frames = [run.namelist.numbers("output", "frame_strains") for run in runs]
-        if not any(has_frame(one, strain) for one in frames):
+        if runs and not any(has_frame(one, strain) for one in frames):
             there = ", ".join(f"{one:g}" for one in sorted({f for one in frames for f in one}))
-            table.complain("strain", "none of its runs has a frame at this strain", strain, there)
+            what = "none of its runs has a frame at this strain"
+            problems.add((*place, "strain"), what, strain, there)

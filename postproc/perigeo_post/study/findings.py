@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from ..measure.export import plain
 from .expressions import (
     TABLE_FUNCTIONS,
     Expression,
@@ -18,11 +19,11 @@ from .expressions import (
     nearest,
 )
 from .plan import PlannedRun
-from .toml import Key, Table
+from .record import AGREES, DIFFERS, IN_PART, NO_RESULT, FindingRecord, Verdict
+from .tables import FindingTable
+from .toml import Key, Problems
 from .types import Column, Value
 
-AGREES, IN_PART, DIFFERS, NO_RESULT = "agrees", "agrees in part", "differs", "no result"
-_KEYS = ("title", "paper", "found", "values", "holds", "note")
 _FILTERS = ("series", "run", "label")
 
 
@@ -53,8 +54,12 @@ class TableRow:
 
 
 @dataclass(frozen=True)
-class _Known:
-    """What expressions may name."""
+class Known:
+    """What expressions may name.
+
+    `runs` is None where other mistakes have kept runs from being planned; what depends on them is
+    not looked at then.
+    """
 
     series: Sequence[str]
     parameters: Sequence[str]
@@ -98,78 +103,47 @@ def _as_list(value: Any) -> list[Any]:
     return list(value) if isinstance(value, (list, tuple)) else [value]
 
 
-def read_finding(
-    table: Table,
-    series: Sequence[str],
-    parameters: Sequence[str],
-    runs: Sequence[PlannedRun] | None,
-    columns: Mapping[str, Column],
+def checked_finding(
+    table: FindingTable, place: Key, known: Known, problems: Problems
 ) -> Finding | None:
-    """A [[finding]] of the study file; None where it is not right.
-
-    `runs` is None where other mistakes have kept runs from being planned; what depends on them is
-    not looked at then.
-    """
-    before = len(table.problems.list)
-    known = _Known(series, parameters, runs, columns)
-    table.only(_KEYS)
-    title = table.text("title", required=True)
-    values: dict[str, Expression] = {}
-    given = table.table("values")
-    for name, text in given.data.items():
-        found = _expression(table, given.at(name), text, list(values), known)
-        if found is not None:
-            values[name] = found
-    holds = [
-        _expression(table, table.at("holds"), text, list(given.data), known)
-        for text in table.texts("holds")
-    ]
-    if not table.texts("holds"):
-        table.complain("holds", "a finding needs a test", allowed='holds = ["ratio < 1.1"]')
-    text = table.text("found", required=True)
-    _check_template(table, text, {**given.data, **values})
-    if before < len(table.problems.list):
+    """A [[finding]] of the study file; None where it is not right."""
+    before = len(problems.list)
+    names: list[str] = []
+    for name, expression in table.values.items():
+        _check((*place, "values", name), expression, names, known, problems)
+        names.append(name)
+    for expression in table.holds:
+        _check((*place, "holds"), expression, names, known, problems)
+    try:
+        for _, part, _, _ in string.Formatter().parse(table.found):
+            if part is not None and part not in names:
+                what = f"unknown name {{{part}}}{nearest(part, names)}"
+                problems.add((*place, "found"), what, table.found, names)
+    except ValueError as error:
+        problems.add((*place, "found"), f"is no text to fill in: {error}", table.found)
+    if before < len(problems.list):
         return None
     return Finding(
-        title=title,
-        paper=table.text("paper"),
-        found=text,
-        note=table.text("note"),
-        values=values,
-        holds=tuple(one for one in holds if one is not None),
+        title=table.title,
+        paper=table.paper,
+        found=table.found,
+        note=table.note,
+        values=dict(table.values),
+        holds=tuple(table.holds),
     )
 
 
-def _check_template(table: Table, text: str, values: Mapping[str, Any]) -> None:
+def _check(
+    place: Key, expression: Expression, names: Iterable[str], known: Known, problems: Problems
+) -> None:
+    """Complain about an expression that names what will not be there."""
     try:
-        for _, name, _, _ in string.Formatter().parse(text):
-            if name is not None and name not in values:
-                what = f"unknown name {{{name}}}{nearest(name, values)}"
-                table.complain("found", what, text, values)
-    except ValueError as error:
-        table.complain("found", f"is no text to fill in: {error}", text)
-
-
-def _expression(
-    table: Table,
-    place: Key,
-    text: Any,
-    names: Iterable[str],
-    known: _Known,
-) -> Expression | None:
-    if not isinstance(text, str):
-        table.problems.add(place, "must be an expression, a text", text)
-        return None
-    try:
-        found = Expression(text)
-        found.check_names(names, [*TABLE_FUNCTIONS, "col", "val"])
-        for call in found.calls:
+        expression.check_names(names, [*TABLE_FUNCTIONS, "col", "val"])
+        for call in expression.calls:
             if isinstance(call.func, ast.Name) and call.func.id in ("col", "val"):
-                known.check_call(found.text, call)
+                known.check_call(expression.text, call)
     except ExpressionError as error:
-        table.problems.add(place, str(error))
-        return None
-    return found
+        problems.add(place, str(error))
 
 
 def matches(run: PlannedRun | TableRow, wanted: Mapping[str, Any]) -> bool:
@@ -192,7 +166,7 @@ def _same(one: Any, other: Any) -> bool:
 # ---- evaluation ------------------------------------------------------------------------------
 
 
-def evaluate(finding: Finding, rows: Sequence[TableRow]) -> dict[str, Any]:
+def evaluate(finding: Finding, rows: Sequence[TableRow]) -> FindingRecord:
     """The finding as it stands in study.json."""
     functions = {**TABLE_FUNCTIONS, **_table_functions(rows)}
     values: dict[str, Any] = {}
@@ -209,9 +183,9 @@ def evaluate(finding: Finding, rows: Sequence[TableRow]) -> dict[str, Any]:
         if missing:
             break
         values[name] = of(expression)
-    tests: list[list[Any]] = []
+    tests: list[tuple[str, bool | None]] = []
     if not missing:
-        tests = [[one.text, _truth(of(one))] for one in finding.holds]
+        tests = [(one.text, _truth(of(one))) for one in finding.holds]
     found = ""
     if not missing:
         try:
@@ -220,18 +194,18 @@ def evaluate(finding: Finding, rows: Sequence[TableRow]) -> dict[str, Any]:
             missing.append(f"the text cannot be filled in: {error}")
     if missing:
         found = f"no result: {missing[0]}"
-    return {
-        "title": finding.title,
-        "paper": finding.paper,
-        "found": found,
-        "verdict": NO_RESULT if missing else verdict([bool(truth) for _, truth in tests]),
-        "note": finding.note,
-        "values": {name: _listed(value) for name, value in values.items()},
-        "holds": tests,
-    }
+    return FindingRecord(
+        title=finding.title,
+        paper=finding.paper,
+        found=found,
+        verdict=NO_RESULT if missing else verdict([bool(truth) for _, truth in tests]),
+        note=finding.note,
+        values=plain({name: _listed(value) for name, value in values.items()}),
+        holds=tests,
+    )
 
 
-def verdict(tests: Sequence[bool]) -> str:
+def verdict(tests: Sequence[bool]) -> Verdict:
     """In one word or three."""
     if all(tests):
         return AGREES

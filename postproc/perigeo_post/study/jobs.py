@@ -9,15 +9,16 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
-import json
 import os
 import signal
 import subprocess
 import time
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import IO, Any
+
+from pydantic import ConfigDict, TypeAdapter, ValidationError
 
 from ..read.errors import OutputError, PostError, RequestError
 from ..read.run import Run
@@ -32,6 +33,8 @@ CALCULATION_FAILED = 4  # exit status of the program that another try would give
 class Record:
     """What run.json holds."""
 
+    __pydantic_config__ = ConfigDict(strict=True, extra="forbid")
+
     identity: str
     program: str
     program_version: str
@@ -43,6 +46,9 @@ class Record:
     threads: int = 1
     points: int | None = None
     steps: int | None = None
+
+
+_RECORD = TypeAdapter(Record)
 
 
 @dataclass
@@ -94,8 +100,8 @@ class Job:
 
     def read_record(self) -> Record | None:
         try:
-            return Record(**json.loads(self.record_path.read_text(encoding="utf-8")))
-        except (OSError, ValueError, TypeError):
+            return _RECORD.validate_json(self.record_path.read_bytes())
+        except (OSError, ValidationError):
             return None
 
     def keep(self, **changes: Any) -> None:
@@ -103,7 +109,7 @@ class Job:
         assert self.record is not None
         for key, value in changes.items():
             setattr(self.record, key, value)
-        text = json.dumps(asdict(self.record), indent=1, ensure_ascii=False)
+        text = _RECORD.dump_json(self.record, indent=1).decode()
         write_whole(self.record_path, text + "\n")
 
     def write_input(self) -> str:

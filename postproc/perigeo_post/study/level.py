@@ -2,29 +2,12 @@
 
 from __future__ import annotations
 
-import re
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from .expressions import Expression, ExpressionError
-from .toml import Key, Problems, Table
-from .types import Column, Value
-
-# Columns of the table of runs that are always there; parameters and measures follow.
-FIXED = {
-    "study": Column("", "name of the study"),
-    "series": Column("", "series of runs within the study"),
-    "run": Column("", "name of the run and of its folder in runs/"),
-    "label": Column("", "what the run is called in figures"),
-    "status": Column("", "done, failed or missing"),
-}
-COUNTED = {
-    "points": Column("1", "points of the model, fictitious ones included"),
-    "steps": Column("1", "time steps of the run"),
-}
-OF_THE_STUDY = ("run.name", "run.output_dir")  # what `set` may not touch
-_RESERVED = (*FIXED, *COUNTED, "case", "pi", "and", "or", "not", "if", "else", "in", "is")
+from .tables import CaseTable, LevelTable
+from .toml import Key
+from .types import Value
 
 Edit = tuple[Key, str, Any]  # place in the study file, key of the namelist, value
 
@@ -50,7 +33,12 @@ class Level:
     label: str
     strain: Any
     line: Any
-    table: Table
+    place: Key
+    title: str
+
+    def at(self, *key: Any) -> Key:
+        """Place of a key in the study file."""
+        return (*self.place, *key)
 
     @property
     def parameters(self) -> list[str]:
@@ -70,144 +58,30 @@ class Level:
             label=self.label or top.label,
             strain=top.strain if self.strain is None else self.strain,
             line=top.line if self.line is None else self.line,
-            table=self.table,
+            place=self.place,
+            title=self.title,
         )
 
 
-# ---- reading a level -------------------------------------------------------------------------
-
-
-def read_level(table: Table, measures: Mapping[str, Any]) -> Level:
-    """Parameters, cases and changes of a table of the study file."""
-    swept: dict[str, list[Value]] = {}
-    fixed: dict[str, Any] = {}
-    parameters = table.table("parameters")
-    for key, value in parameters.data.items():
-        if not _good_parameter(parameters, key):
-            continue
-        if isinstance(value, list):
-            if not value:
-                parameters.complain(key, "must have one value at least", value)
-            elif len(set(map(repr, value))) < len(value):
-                parameters.complain(key, "has the same value twice", value)
-            elif all(_is_plain(item) for item in value):
-                swept[key] = value
-            else:
-                parameters.complain(
-                    key, "must be numbers, texts, true or false", value,
-                    "for several values that go together: [[case]]",
-                )  # fmt: skip
-        elif isinstance(value, str) and value.startswith("="):
-            fixed[key] = _expression(parameters, key, value)
-        elif _is_plain(value):
-            fixed[key] = value
-        else:
-            parameters.complain(key, "must be a number or a text, or a list of them", value)
+def level_of(table: LevelTable, place: Key, name: str) -> Level:
+    """The contents of a table of the study file; `name` stands for a title."""
+    parameters = table.parameters.items()
     return Level(
-        swept=swept,
-        fixed=fixed,
-        cases=[_case(item) for item in table.tables("case")],
-        edits=_edits(table.table("set")),
-        measures=table.choices("measures", measures, "measure"),
-        label=table.text("label"),
-        strain=_strain(table),
-        line=_line(table),
-        table=table,
+        swept={key: value for key, value in parameters if isinstance(value, list)},
+        fixed={key: value for key, value in parameters if not isinstance(value, list)},
+        cases=[
+            Case(case.label, dict(case.values), _edits(case, (*place, "case", number)))
+            for number, case in enumerate(table.case)
+        ],
+        edits=_edits(table, place),
+        measures=list(table.measures),
+        label=table.label,
+        strain=table.strain,
+        line=table.line,
+        place=place,
+        title=table.title or name,
     )
 
 
-def _is_plain(value: Any) -> bool:
-    return isinstance(value, (bool, int, float, str))
-
-
-def _good_parameter(table: Table, key: str) -> bool:
-    if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", key):
-        table.complain(key, "is no name of a parameter", allowed="letters, digits and _")
-        return False
-    if key in _RESERVED:
-        table.complain(key, "cannot be the name of a parameter: it has a meaning of its own")
-        return False
-    return True
-
-
-def _expression(table: Table, key: str, text: str) -> Expression | None:
-    try:
-        return Expression(text[1:])
-    except ExpressionError as error:
-        table.complain(key, str(error))
-        return None
-
-
-def _case(table: Table) -> Case:
-    table.only(("label", "values", "set"))
-    values = table.table("values")
-    good = {}
-    for key, value in values.data.items():
-        if not _good_parameter(values, key):
-            continue
-        if _is_plain(value):
-            good[key] = value
-        else:
-            values.complain(key, "must be a number, a text, true or false", value)
-    if not table.data.get("values") and not table.data.get("set"):
-        table.problems.add(table.place, "a case needs values or set")
-    return Case(table.text("label"), good, _edits(table.table("set")))
-
-
-def _edits(table: Table) -> list[Edit]:
-    """The changes of [set]; tables within tables, as of unquoted keys, are joined."""
-    found: list[Edit] = []
-
-    def walk(data: Mapping[str, Any], names: tuple[str, ...]) -> None:
-        for key, value in data.items():
-            if isinstance(value, Mapping):
-                walk(value, (*names, key))
-                continue
-            place = table.at(*names, key)
-            target = ".".join((*names, key))
-            if target.lower() in OF_THE_STUDY:
-                table.problems.add(place, "is set by the study itself")
-                continue
-            found.append((place, target, _prepared(table.problems, place, value)))
-
-    walk(table.data, ())
-    return found
-
-
-def _prepared(problems: Problems, place: Key, value: Any) -> Any:
-    """A value with its expressions parsed; None where one is wrong."""
-    if isinstance(value, list):
-        return [_prepared(problems, place, item) for item in value]
-    if isinstance(value, str) and value.startswith("="):
-        try:
-            return Expression(value[1:])
-        except ExpressionError as error:
-            problems.add(place, str(error))
-            return None
-    if not _is_plain(value):
-        problems.add(place, "must be a number, a text or a list of them", value)
-        return None
-    return value
-
-
-def _strain(table: Table) -> Any:
-    value = table.data.get("strain")
-    if isinstance(value, str) and value.startswith("="):
-        return _expression(table, "strain", value)
-    if value is not None and (isinstance(value, bool) or not isinstance(value, (int, float))):
-        table.complain("strain", "must be a number", value, "a nominal strain: 0.01")
-        return None
-    return value
-
-
-def _line(table: Table) -> Any:
-    value = table.data.get("line")
-    if value is None:
-        return None
-    if isinstance(value, list) and len(value) == 4:
-        value = [value[:2], value[2:]]
-    points = value if isinstance(value, list) else []
-    if len(points) != 2 or not all(isinstance(p, list) and len(p) == 2 for p in points):
-        table.complain("line", "must be two points", value, "[[x, y], [x, y]] or [x, y, x, y]")
-        return None
-    return _prepared(table.problems, table.at("line"), value)
+def _edits(table: LevelTable | CaseTable, place: Key) -> list[Edit]:
+    return [((*place, "set", key), key, value) for key, value in table.set.items()]

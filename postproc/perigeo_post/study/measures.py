@@ -1,12 +1,13 @@
 """The measures that a study can ask for: groups of columns of its table of runs.
 
-Each group takes one run at one state. Nothing is raised for what a run cannot tell: the value is
-None then. doc/results.md defines the quantities.
+Each group takes one run at one state. Nothing is raised for what a run cannot tell: in place of the
+value stands why there is none. doc/results.md defines the quantities.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from typing import Union
 
 import numpy as np
 
@@ -23,41 +24,47 @@ from ..measure.quality import (
     reaction_gap,
 )
 from ..measure.softening import softening_branch, strain_rate
-from ..read.errors import PostError
+from ..read.errors import FieldNotFoundError, PostError, RequestError
+from ..read.points import FloatArray
 from ..read.run import Frame, Run
-from .types import Column, Measure, State, Value
+from .types import Column, Measure, Missing, State, Value
 
 STRAINS = {"0_5": 0.005, "1_0": 0.010, "1_5": 0.015}  # at which the stress is listed
 
-Values = dict[str, Value]
+Values = dict[str, Union[Value, Missing]]
+Part = Callable[[Run, State], Values]
 
 
-def _tried(what: Callable[[], Mapping[str, Value] | None]) -> Values:
-    """What could be measured; nothing where the result does not hold it."""
-    try:
-        return dict(what() or {})
-    except (PostError, ValueError, ArithmeticError, np.linalg.LinAlgError):
-        return {}
-
-
-def _measure(columns: Mapping[str, Column], *parts: Callable[[Run, State], Values]) -> Measure:
-    """A group whose columns are filled by several parts, each of which may fail by itself."""
+def _measure(parts: Mapping[Part, Mapping[str, Column]]) -> Measure:
+    """A group of columns: what gives values, each with its columns, may fail by itself."""
 
     def take(run: Run, state: State) -> Values:
         found: Values = {}
-        for part in parts:
-            found.update(_tried(lambda part=part: part(run, state)))  # type: ignore[misc]
-        return {name: _plain(found.get(name)) for name in columns}
+        for part, columns in parts.items():
+            try:
+                values = part(run, state)
+            except (PostError, ValueError, ArithmeticError, np.linalg.LinAlgError) as error:
+                reason = str(error) if isinstance(error, PostError) else type(error).__name__
+                found.update(dict.fromkeys(columns, Missing(reason)))
+            else:
+                found.update({name: _plain(values[name]) for name in columns})
+        return found
 
-    return Measure(columns, take)
+    return Measure({k: v for columns in parts.values() for k, v in columns.items()}, take)
 
 
-def _plain(value: Value) -> Value:
-    """Python's own numbers, None for what is not finite."""
-    if value is None or isinstance(value, (bool, str, int)):
+def _plain(value: Value | Missing) -> Value | Missing:
+    """Python's own numbers, a reason for what is not finite."""
+    if isinstance(value, (bool, str, int, Missing)):
         return value
-    number = float(value)
-    return number if np.isfinite(number) else None
+    number = float("nan") if value is None else float(value)
+    return number if np.isfinite(number) else Missing("it has no finite value in this run")
+
+
+def _or(value: Value, reason: str) -> Value | Missing:
+    """A value; the reason where it is none or not finite."""
+    found = _plain(value)
+    return Missing(reason) if isinstance(found, Missing) else found
 
 
 def frame_of(run: Run, state: State) -> Frame:
@@ -70,10 +77,14 @@ def frame_of(run: Run, state: State) -> Frame:
 _CURVE = {
     "peak_stress": Column("Pa", "largest axial stress (reaction of the first platen over width)"),
     "strain_at_peak": Column("1", "nominal strain at the peak stress"),
-    "state_strain": Column("1", "nominal strain of the frame at which fields are measured"),
-    "stress_at_state": Column("Pa", "axial stress at the time of that frame"),
     "last_strain": Column("1", "nominal strain at the end of the run"),
     "last_stress": Column("Pa", "axial stress at the end of the run"),
+}
+_AT_STATE = {
+    "stress_at_state": Column("Pa", "axial stress at the time of the frame of the state"),
+}
+_FRAME = {
+    "state_strain": Column("1", "nominal strain of the frame at which fields are measured"),
     "largest_alpha": Column("1", "largest equivalent plastic strain of the body in that frame"),
 }
 
@@ -81,10 +92,14 @@ _CURVE = {
 def _curve(run: Run, state: State) -> Values:
     curve = stress_strain(run)
     stress, strain = peak(curve)
-    found: Values = {"peak_stress": stress, "strain_at_peak": strain}
-    if len(curve.x):
-        found.update(last_strain=float(curve.x[-1]), last_stress=float(curve.y[-1]))
-    return found
+    last = (float(curve.x[-1]), float(curve.y[-1])) if len(curve.x) else (None, None)
+    none = "the history has no row with a stress"
+    return {
+        "peak_stress": _or(stress, none),
+        "strain_at_peak": _or(strain, none),
+        "last_strain": _or(last[0], none),
+        "last_stress": _or(last[1], none),
+    }
 
 
 def _curve_at_state(run: Run, state: State) -> Values:
@@ -102,31 +117,42 @@ def _frame_numbers(run: Run, state: State) -> Values:
 # ---- modulus -------------------------------------------------------------------------------
 
 _NU = "times 1 - nu^2, from 0.02 to 0.1 % strain"
-_MODULUS = {
-    "modulus_platen": Column("Pa", f"slope of platen reaction over width against strain, {_NU}"),
-    "modulus_gauge": Column(
-        "Pa", f"slope of the same stress against the strain between two lines inside, {_NU}"
+_MODULUS: dict[str, tuple[Column, Callable[[Run], float | None]]] = {
+    "modulus_platen": (
+        Column("Pa", f"slope of platen reaction over width against strain, {_NU}"),
+        lambda run: apparent_modulus(run).value,
     ),
-    "modulus_gauge_rows": Column(
-        "Pa", "as modulus_gauge, but from single rows of points, which carry zero-energy modes"
+    "modulus_gauge": (
+        Column(
+            "Pa", f"slope of the same stress against the strain between two lines inside, {_NU}"
+        ),
+        lambda run: gauge_modulus(run).value,
     ),
-    "modulus_mean": Column("Pa", f"slope of mean stress against mean strain of the body, {_NU}"),
-    "modulus_mean_corrected": Column(
-        "Pa", "as modulus_mean, without what the mean lateral stress adds to the axial stress"
+    "modulus_gauge_rows": (
+        Column(
+            "Pa", "as modulus_gauge, but from single rows of points, which carry zero-energy modes"
+        ),
+        lambda run: gauge_modulus(run, thick=False).value,
     ),
-    "modulus_target": Column("Pa", "Young's modulus of the input"),
+    "modulus_mean": (
+        Column("Pa", f"slope of mean stress against mean strain of the body, {_NU}"),
+        lambda run: mean_modulus(run).value,
+    ),
+    "modulus_mean_corrected": (
+        Column(
+            "Pa", "as modulus_mean, without what the mean lateral stress adds to the axial stress"
+        ),
+        lambda run: mean_modulus(run, True).value,
+    ),
+    "modulus_target": (
+        Column("Pa", "Young's modulus of the input"),
+        lambda run: run.number("material.youngs_modulus"),
+    ),
 }
 
 
-def _modulus_parts() -> list[Callable[[Run, State], Values]]:
-    return [
-        lambda run, _: {"modulus_platen": apparent_modulus(run).value},
-        lambda run, _: {"modulus_gauge": gauge_modulus(run).value},
-        lambda run, _: {"modulus_gauge_rows": gauge_modulus(run, thick=False).value},
-        lambda run, _: {"modulus_mean": mean_modulus(run).value},
-        lambda run, _: {"modulus_mean_corrected": mean_modulus(run, True).value},
-        lambda run, _: {"modulus_target": run.number("material.youngs_modulus")},
-    ]
+def _modulus(name: str) -> Part:
+    return lambda run, state: {name: _MODULUS[name][1](run)}
 
 
 # ---- band ----------------------------------------------------------------------------------
@@ -144,11 +170,13 @@ _BAND = {
     "angle": Column("degrees", "angle between the prevailing band and the loading axis"),
     "angle_uncertainty": Column("degrees", "one spacing over the length fitted"),
     "direction": Column("1", "diagonal of the prevailing band, rising or falling"),
+    "profile_mirrored": Column("1", "true: the given line was mirrored to cross the band"),
+}
+_PATTERN = {
     "band_ratio": Column("1", "weaker over stronger band, plastic strain so far"),
     "band_ratio_growing": Column("1", "the same of what was added since the frame before"),
     "pattern": Column("1", "X: weaker band from 0.25 of the stronger on; single; diffuse; none"),
     "pattern_growing": Column("1", "the same of what was added, X from 0.5 on"),
-    "profile_mirrored": Column("1", "true: the given line was mirrored to cross the band"),
 }
 
 
@@ -199,27 +227,36 @@ def _band(run: Run, state: State) -> Values:
 
 def _pattern(run: Run, state: State) -> Values:
     found = pattern_of(frame_of(run, state))
+    nothing = "there is no earlier frame, or no band in what has grown since"
     return {
-        "band_ratio": found.ratio,
-        "band_ratio_growing": found.ratio_growing,
+        "band_ratio": _or(found.ratio, f"the pattern is {found.name}"),
+        "band_ratio_growing": _or(found.ratio_growing, nothing),
         "pattern": found.name,
-        "pattern_growing": found.growing,
+        "pattern_growing": _or(found.growing, nothing),
     }
 
 
 # ---- quality -------------------------------------------------------------------------------
 
-_QUALITY = {
+_KINETIC = {
     "kinetic_ratio": Column("1", "kinetic energy of v - v_ref over internal energy at the state"),
     "kinetic_ratio_largest": Column("1", "largest of the frames from 0.05 % strain on"),
+}
+_KINETIC_BOUND = {
     "kinetic_bound_peak": Column("1", "upper bound of that ratio at the peak stress"),
     "kinetic_bound_largest": Column("1", "largest upper bound from 0.05 % strain on"),
+}
+_GAP = {
     "reaction_gap": Column(
         "1", "difference of the platen reactions over the largest, at the state"
     ),
     "reaction_gap_peak": Column("1", "the same at the peak stress"),
     "reaction_gap_largest": Column("1", "largest from 0.05 % strain on"),
+}
+_BALANCE = {
     "energy_error_largest": Column("1", "largest error of the energy balance of the program"),
+}
+_ZERO_ENERGY = {
     "zero_energy_largest": Column("1", "largest zero-energy measure of the body at the state"),
 }
 
@@ -257,19 +294,27 @@ def _zero_energy(run: Run, state: State) -> Values:
 
 # ---- softening -----------------------------------------------------------------------------
 
-_SOFTENING = {
+_BRANCH = {
     "strain_at_90": Column("1", "nominal strain where the stress has fallen to 90 % of its peak"),
     "strain_at_50": Column("1", "nominal strain where it has fallen to 50 %"),
     "softening_slope": Column("Pa", "fall of stress over strain between 90 and 50 % of the peak"),
     "softening_displacement": Column("m", "approach of the platens between 90 and 50 %"),
+}
+_BRITTLENESS = {
     "brittleness": Column("1", "softening_slope over the elastic slope"),
+}
+_STRESS_RATIO = {
     "stress_ratio": Column("1", "axial stress at the state over its peak"),
-    **{
-        f"stress_{name}": Column("Pa", f"axial stress at {100.0 * s:g} % nominal strain")
-        for name, s in STRAINS.items()
-    },
+}
+_STRESSES = {
+    f"stress_{name}": Column("Pa", f"axial stress at {100.0 * s:g} % nominal strain")
+    for name, s in STRAINS.items()
+}
+_DISSIPATION = {
     "dissipated_energy": Column("J/m", "plastic work up to the state"),
     "dissipated_density": Column("J/m^3", "the same over the area of the body"),
+}
+_RATE = {
     "strain_rate": Column("1/s", "mean rate of the nominal strain"),
     "approach_velocity": Column("m/s", "mean velocity at which the platens approach"),
 }
@@ -277,21 +322,26 @@ _SOFTENING = {
 
 def _branch(run: Run, state: State) -> Values:
     found = softening_branch(run)
+    early = "the run ends before the stress has fallen that far"
     return {
-        "strain_at_90": found.strain_upper,
-        "strain_at_50": found.strain_lower,
-        "softening_slope": found.slope,
-        "softening_displacement": found.displacement,
+        "strain_at_90": _or(found.strain_upper, early),
+        "strain_at_50": _or(found.strain_lower, early),
+        "softening_slope": _or(found.slope, early),
+        "softening_displacement": _or(found.displacement, early),
     }
 
 
 def _brittleness(run: Run, state: State) -> Values:
-    return {"brittleness": softening_branch(run).slope / apparent_modulus(run).slope}
+    slope = softening_branch(run).slope / apparent_modulus(run).slope
+    return {"brittleness": _or(slope, "the run ends before the stress has fallen to 50 %")}
 
 
 def _stresses(run: Run, state: State) -> Values:
     curve = stress_strain(run)
-    return {f"stress_{name}": curve.at(strain) for name, strain in STRAINS.items()}
+    return {
+        f"stress_{name}": _or(curve.at(strain), "the run does not reach this strain")
+        for name, strain in STRAINS.items()
+    }
 
 
 def _stress_ratio(run: Run, state: State) -> Values:
@@ -318,12 +368,22 @@ _FIELD = {
     "yield_stress_mean": Column("Pa", "mean initial yield stress of the body, over its volume"),
     "yield_stress_variation": Column("1", "its coefficient of variation"),
     "yield_stress_least": Column("Pa", "its smallest value"),
+}
+_FIELD_IN_BAND = {
     "yield_stress_band": Column("Pa", "its mean where the plastic strain exceeds half the peak"),
 }
 
 
+def _strength(run: Run) -> FloatArray:
+    """Initial yield stress of the points of the body."""
+    try:
+        return run.last_frame["yield_stress"][run.body]
+    except FieldNotFoundError:
+        raise RequestError("the result holds no field of the yield stress") from None
+
+
 def _field(run: Run, state: State) -> Values:
-    values = run.last_frame["yield_stress"][run.body]
+    values = _strength(run)
     volumes = run.volumes[run.body]
     mean = float(np.average(values, weights=volumes))
     spread = float(np.sqrt(np.average((values - mean) ** 2, weights=volumes)))
@@ -335,7 +395,7 @@ def _field(run: Run, state: State) -> Values:
 
 
 def _field_in_band(run: Run, state: State) -> Values:
-    values = run.last_frame["yield_stress"][run.body]
+    values = _strength(run)
     alpha = frame_of(run, state)["plastic_strain"][run.body]
     inside = alpha > 0.5 * measure_band(run, number=frame_of(run, state).number).width.peak
     return {
@@ -346,12 +406,27 @@ def _field_in_band(run: Run, state: State) -> Values:
 
 
 MEASURES: dict[str, Measure] = {
-    "curve": _measure(_CURVE, _curve, _curve_at_state, _frame_numbers),
-    "modulus": _measure(_MODULUS, *_modulus_parts()),
-    "band": _measure(_BAND, _band, _pattern),
-    "quality": _measure(_QUALITY, _kinetic, _bound, _gap, _balance, _zero_energy),
-    "softening": _measure(
-        _SOFTENING, _branch, _brittleness, _stresses, _stress_ratio, _dissipation, _rate
+    "curve": _measure({_curve: _CURVE, _curve_at_state: _AT_STATE, _frame_numbers: _FRAME}),
+    "modulus": _measure({_modulus(name): {name: about} for name, (about, _) in _MODULUS.items()}),
+    "band": _measure({_band: _BAND, _pattern: _PATTERN}),
+    "quality": _measure(
+        {
+            _kinetic: _KINETIC,
+            _bound: _KINETIC_BOUND,
+            _gap: _GAP,
+            _balance: _BALANCE,
+            _zero_energy: _ZERO_ENERGY,
+        }
     ),
-    "field": _measure(_FIELD, _field, _field_in_band),
+    "softening": _measure(
+        {
+            _branch: _BRANCH,
+            _brittleness: _BRITTLENESS,
+            _stress_ratio: _STRESS_RATIO,
+            _stresses: _STRESSES,
+            _dissipation: _DISSIPATION,
+            _rate: _RATE,
+        }
+    ),
+    "field": _measure({_field: _FIELD, _field_in_band: _FIELD_IN_BAND}),
 }

@@ -12,8 +12,9 @@ from pathlib import Path
 from typing import Any
 
 from .expressions import Expression, ExpressionError, nearest
-from .level import OF_THE_STUDY, Case, Edit, Level
+from .level import Case, Edit, Level
 from .namelist import Namelist, NamelistError, file_names
+from .tables import OF_THE_STUDY
 from .toml import Problems
 from .types import State, Value
 
@@ -75,13 +76,13 @@ class Planner:
         for values in level.swept.values():
             count *= len(values)
         if len(self.runs) + count > MOST_RUNS:
-            self.problems.add(level.table.at("parameters"), f"more than {MOST_RUNS} runs", count)
+            self.problems.add(level.at("parameters"), f"more than {MOST_RUNS} runs", count)
             return
         labels: dict[str, str] = {}
         for number, case in enumerate(level.cases or [Case()]):
             clash = [key for key in case.values if key in level.swept]
             if clash:
-                place = level.table.at("case", number, "values", clash[0])
+                place = level.at("case", number, "values", clash[0])
                 self.problems.add(place, f"{clash[0]} is one of the parameters too")
                 continue
             for combination in itertools.product(*level.swept.values()):
@@ -92,7 +93,7 @@ class Planner:
                 run = self._with_id(run, prefix, alone)
                 if run.label in labels:
                     what = f"the runs {labels[run.label]} and {run.id} have the same label"
-                    self.problems.add(level.table.at("label"), what, run.label)
+                    self.problems.add(level.at("label"), what, run.label)
                 labels[run.label] = run.id
                 self.runs.append(run)
 
@@ -136,7 +137,7 @@ class Planner:
             try:
                 found[key] = expression.value(found)
             except ExpressionError as error:
-                self.problems.add(level.table.at("parameters", key), str(error))
+                self.problems.add(level.at("parameters", key), str(error))
                 return None
         return found
 
@@ -176,10 +177,9 @@ class Planner:
         if not level.label:
             parts = [own] if own else []
             parts += [f"{key} = {_plain(value)}" for key, value in swept.items()]
-            alone = level.table.text("title") or level.table.text("name")
-            return ", ".join(parts) or alone
+            return ", ".join(parts) or level.title
         known = {**parameters, "case": own}
-        place = level.table.at("label")
+        place = level.at("label")
         try:
             for _, name, _, _ in string.Formatter().parse(level.label):
                 if name is not None and name not in known:
@@ -195,7 +195,7 @@ class Planner:
         self, level: Level, parameters: Mapping[str, Value], namelist: Namelist, label: str
     ) -> State:
         """Where measures are taken. Those at a strain need a frame there."""
-        at = level.table.at
+        at = level.at
         try:
             strain = _number(_valued(level.strain, parameters))
         except ExpressionError as error:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import os
 import platform
 import subprocess
@@ -18,16 +17,28 @@ import numpy as np
 
 from ..draw.style import save_figure
 from ..measure.export import plain, write_rows
-from ..read.errors import PostError
+from ..read.errors import PostError, ResultError
 from ..read.run import Run
 from .file import FigureSpec, Kinds, Study
 from .findings import TableRow, evaluate
 from .jobs import Job, cores, write_whole
 from .plan import PlannedRun
-from .types import StudyRun, Value
+from .record import (
+    DONE,
+    FAILED,
+    FILE,
+    MISSING,
+    SCHEMA,
+    SCHEMA_VERSION,
+    FigureRecord,
+    RunRecord,
+    SeriesRecord,
+    StudyRecord,
+    read_record,
+)
+from .record import State as Status
+from .types import Missing, StudyRun, Value
 
-SCHEMA = "perigeo study"
-SCHEMA_VERSION = 1
 # What the numbers and verdicts of a study come from.
 MEASURING = (
     "read/*.py",
@@ -36,7 +47,6 @@ MEASURING = (
     "study/expressions.py",
     "study/findings.py",
 )
-STATUS = {"done": "done", "failed": "failed"}  # of a job; anything else is missing
 
 
 @dataclass
@@ -47,6 +57,7 @@ class Outcome:
     jobs: Mapping[str, Job]  # by the name of the run; runs that compute the same share one
     program_version: str
     rows: dict[str, dict[str, Value]] = field(default_factory=dict)  # measured, by run
+    reasons: dict[str, dict[str, str]] = field(default_factory=dict)  # why not, by run
     runs: list[StudyRun] = field(default_factory=list)
     drawn: list[FigureSpec] = field(default_factory=list)
     problems: list[str] = field(default_factory=list)
@@ -55,8 +66,9 @@ class Outcome:
     def name(self) -> str:
         return self.study.name
 
-    def status(self, run: PlannedRun) -> str:
-        return STATUS.get(self.jobs[run.id].status, "missing")
+    def status(self, run: PlannedRun) -> Status:
+        found = self.jobs[run.id].status
+        return found if found in (DONE, FAILED) else MISSING
 
     @property
     def distinct(self) -> list[Job]:
@@ -78,17 +90,22 @@ def measure(outcome: Outcome, kinds: Kinds) -> None:
         if job.status != "done":
             continue
         run = Run(job.result)
+        reasons: dict[str, str] = {}
         for name in planned.measures:
             one = kinds.measures[name]
-            found: Mapping[str, Value] = {}
+            found: Mapping[str, Value | Missing] = {}
+            reason = f"{name} does not give it"
             try:
                 found = one.take(run, planned.state)
-            except PostError as error:
-                outcome.problems.append(f"{planned.id}: {name} cannot be measured: {error}")
             except Exception as error:  # one measure must not cost the others
-                what = f"{type(error).__name__}: {error}"
-                outcome.problems.append(f"{planned.id}: {name} cannot be measured: {what}")
-            row.update({column: plain(found.get(column)) for column in one.columns})
+                reason = failure(error)
+                outcome.problems.append(f"{planned.id}: {name} cannot be measured: {reason}")
+            for column in one.columns:
+                value = found.get(column, Missing(reason))
+                row[column] = None if isinstance(value, Missing) else plain(value)
+                if isinstance(value, Missing):
+                    reasons[column] = value.reason.replace(f"{job.folder}{os.sep}", "")
+        outcome.reasons[planned.id] = reasons
         outcome.runs.append(
             StudyRun(
                 id=planned.id,
@@ -102,6 +119,11 @@ def measure(outcome: Outcome, kinds: Kinds) -> None:
         )
 
 
+def failure(error: Exception) -> str:
+    """Why something could not be done; one that is not meant for users says its kind too."""
+    return str(error) if isinstance(error, PostError) else f"{type(error).__name__}: {error}"
+
+
 def _cells(outcome: Outcome, run: PlannedRun) -> dict[str, Value]:
     """A row of the table, without what has no value."""
     return {
@@ -112,6 +134,7 @@ def _cells(outcome: Outcome, run: PlannedRun) -> dict[str, Value]:
         "status": outcome.status(run),
         **run.parameters,
         **outcome.rows.get(run.id, {}),
+        "reasons": "; ".join(f"{k}: {v}" for k, v in outcome.reasons.get(run.id, {}).items()),
     }
 
 
@@ -151,98 +174,92 @@ def draw(outcome: Outcome, kinds: Kinds, folder: Path) -> None:
             save_figure(drawing.figure, folder / f"{spec.name}.pdf")
             _write_csv(folder / f"{spec.name}.csv", drawing.rows)
             outcome.drawn.append(spec)
-        except PostError as error:
-            outcome.problems.append(f"figure {spec.name} cannot be drawn: {error}")
         except Exception as error:  # one figure must not cost the others
-            what = f"{type(error).__name__}: {error}"
-            outcome.problems.append(f"figure {spec.name} cannot be drawn: {what}")
+            outcome.problems.append(f"figure {spec.name} cannot be drawn: {failure(error)}")
 
 
 # ---- study.json ------------------------------------------------------------------------------
 
 
-def report(outcome: Outcome, fingerprint: str) -> dict[str, Any]:
-    """What study.json holds: paths are relative to its folder."""
+def report(outcome: Outcome, fingerprint: str) -> StudyRecord:
+    """The record of a study."""
     study = outcome.study
     rows = [
         TableRow(run.id, run.label, run.series, run.parameters, _cells(outcome, run))
         for run in study.runs
     ]
-    complete = all(outcome.status(run) == "done" for run in study.runs)
-    return {
-        "schema": SCHEMA,
-        "schema_version": SCHEMA_VERSION,
-        "name": study.name,
-        "title": study.title,
-        "question": study.question,
-        "file": study.path.name,
-        "base": study.base.name,
-        "created": datetime.now(timezone.utc).isoformat(timespec="seconds"),
-        "fingerprint": fingerprint,
-        "program_version": outcome.program_version,
-        "machine": machine(),
-        "complete": complete and len(outcome.drawn) == len(study.figures),
-        "seconds": sum(job.record.seconds for job in outcome.distinct if job.record),
-        "series": [{"name": name, "title": title} for name, title in study.series],
-        "runs": [_run_entry(outcome, run) for run in study.runs],
-        "units": {name: column.unit for name, column in study.columns.items()},
-        "descriptions": {name: column.description for name, column in study.columns.items()},
-        "figures": [
-            {
-                "name": spec.name,
-                **{ending: f"{spec.name}.{ending}" for ending in ("png", "pdf", "csv")},
-                "title": spec.title,
-                "caption": spec.caption,
-                "alt": spec.alt,
-            }
+    complete = all(outcome.status(run) == DONE for run in study.runs)
+    return StudyRecord(
+        kind=SCHEMA,
+        schema_version=SCHEMA_VERSION,
+        name=study.name,
+        title=study.title,
+        question=study.question,
+        file=study.path.name,
+        base=study.base.name,
+        created=datetime.now(timezone.utc).isoformat(timespec="seconds"),
+        fingerprint=fingerprint,
+        program_version=outcome.program_version,
+        machine=machine(),
+        complete=complete and len(outcome.drawn) == len(study.figures),
+        seconds=sum(job.record.seconds for job in outcome.distinct if job.record),
+        series_listed=[SeriesRecord(name=name, title=title) for name, title in study.series],
+        runs=[_run_entry(outcome, run) for run in study.runs],
+        units={name: column.unit for name, column in study.columns.items()},
+        descriptions={name: column.description for name, column in study.columns.items()},
+        figures=[
+            FigureRecord(
+                name=spec.name,
+                png=f"{spec.name}.png",
+                pdf=f"{spec.name}.pdf",
+                csv=f"{spec.name}.csv",
+                title=spec.title,
+                caption=spec.caption,
+                alt=spec.alt,
+            )
             for spec in outcome.drawn
         ],
-        "findings": [evaluate(finding, rows) for finding in study.findings],
-        "problems": list(outcome.problems),
-        "csv": f"{study.name}.csv",
-    }
+        findings=[evaluate(finding, rows) for finding in study.findings],
+        problems=list(outcome.problems),
+        csv=f"{study.name}.csv",
+    )
 
 
-def _run_entry(outcome: Outcome, run: PlannedRun) -> dict[str, Any]:
+def _run_entry(outcome: Outcome, run: PlannedRun) -> RunRecord:
     job = outcome.jobs[run.id]
-    record = job.record
     place = f"runs/{job.id}/{job.id}"
-    return {
-        "id": run.id,
-        "series": run.series,
-        "label": run.label,
-        "parameters": dict(run.parameters),
-        "status": outcome.status(run),
-        "exit_status": record.exit_status if record else None,
-        "message": record.message if record else "",
-        "input": f"{place}.nml",
-        "result": f"{place}.h5",
-        "program_version": record.program_version if record else None,
-        "input_sha256": record.input_sha256 if record else None,
-        "seconds": record.seconds if record else None,
-        "threads": record.threads if record else None,
-        "points": record.points if record else None,
-        "steps": record.steps if record else None,
-        "row": outcome.rows.get(run.id, {}),
-    }
+    found = RunRecord(
+        id=run.id,
+        series=run.series,
+        label=run.label,
+        parameters=run.parameters,
+        status=outcome.status(run),
+        input=f"{place}.nml",
+        result=f"{place}.h5",
+        row=outcome.rows.get(run.id, {}),
+        reasons=outcome.reasons.get(run.id, {}),
+    )
+    if job.record is not None:
+        for name in ("exit_status", "message", "program_version", "input_sha256", "seconds",
+                     "threads", "points", "steps"):  # fmt: skip
+            setattr(found, name, getattr(job.record, name))
+    return found
 
 
-def write_report(data: Mapping[str, Any], folder: Path) -> None:
+def write_report(record: StudyRecord, folder: Path) -> None:
     """Write study.json."""
-    text = json.dumps(plain(data), indent=1, ensure_ascii=False, allow_nan=False)
-    write_whole(folder / "study.json", text + "\n")
+    write_whole(folder / FILE, record.text())
 
 
-def read_report(folder: Path) -> dict[str, Any] | None:
-    """What study.json holds, None where it is not there or not ours."""
+def read_report(folder: Path) -> StudyRecord | None:
+    """The record of an earlier call, None where it is not there or not ours."""
     try:
-        data = json.loads((folder / "study.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        return read_record(folder)
+    except ResultError:
         return None
-    return data if isinstance(data, dict) and data.get("schema") == SCHEMA else None
 
 
-def machine() -> dict[str, Any]:
+def machine() -> dict[str, Value]:
     """The processor, its cores and the system."""
     return {
         "processor": _processor(),
@@ -299,10 +316,10 @@ def fingerprint(outcome: Outcome) -> str:
     return digest.hexdigest()
 
 
-def is_up_to_date(data: Mapping[str, Any] | None, mark: str, folder: Path) -> bool:
+def is_up_to_date(record: StudyRecord | None, mark: str, folder: Path) -> bool:
     """Whether tables and figures of an earlier call still hold."""
-    if data is None or data.get("fingerprint") != mark or data.get("problems"):
+    if record is None or record.fingerprint != mark or record.problems:
         return False
-    files = [data["csv"], f"{data['name']}_columns.csv"]
-    files += [figure[kind] for figure in data["figures"] for kind in ("png", "pdf", "csv")]
+    files = [record.csv, f"{record.name}_columns.csv"]
+    files += [name for one in record.figures for name in (one.png, one.pdf, one.csv)]
     return all((folder / name).is_file() for name in files)

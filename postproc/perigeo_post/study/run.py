@@ -13,13 +13,14 @@ import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TextIO
+from typing import TextIO
 
 from ..read.errors import RequestError
 from .file import Kinds, Study, load_study
 from .jobs import Job, cores, look, only_one
 from .program import Program, find_program
 from .progress import Progress, duration
+from .record import StudyRecord
 from .results import (
     Outcome,
     draw,
@@ -133,7 +134,7 @@ def _do(
         data = report(outcome, mark)
         write_report(data, folder)
     _tell(data, distinct, folder, progress)
-    bad = any(job.status == "failed" for job in wanted) or bool(data["problems"])
+    bad = any(job.status == "failed" for job in wanted) or bool(data.problems)
     return RUN_FAILED if bad else 0
 
 
@@ -204,10 +205,10 @@ def _tell_plan(study: Study, jobs: Mapping[str, Job], progress: Progress) -> Non
     progress.say(f"  {len(todo)} of {len(seen)} runs to be made, about {duration(left)}")
 
 
-def _tell(data: Mapping[str, Any], jobs: Sequence[Job], folder: Path, progress: Progress) -> None:
+def _tell(data: StudyRecord, jobs: Sequence[Job], folder: Path, progress: Progress) -> None:
     """What came out of the study, where it is, and what did not work."""
     say = progress.say
-    say(f"{data['name']}: {data['title']}")
+    say(f"{data.name}: {data.title}")
     made = [job for job in jobs if job.status == "done" and not job.reused]
     reused = sum(job.status == "done" and job.reused for job in jobs)
     seconds = sum(job.record.seconds - job.before for job in made if job.record is not None)
@@ -218,21 +219,26 @@ def _tell(data: Mapping[str, Any], jobs: Sequence[Job], folder: Path, progress: 
     missing = len(jobs) - len(made) - reused - failed
     words += [f"{missing} missing"] if missing else []
     say(f"  runs      {', '.join(words) or 'none'}")
-    for number, figure in enumerate(data["figures"]):
-        place = os.path.join(folder, figure["png"])
+    for number, figure in enumerate(data.figures):
+        place = os.path.join(folder, figure.png)
         say(f"  {'figures' if number == 0 else '':<9} {place}, .pdf, .csv")
-    say(f"  table     {os.path.join(folder, data['csv'])}")
-    if data["findings"]:
+    say(f"  table     {os.path.join(folder, data.csv)}")
+    if data.findings:
         say("  findings")
-    for finding in data["findings"]:
-        say(f"    {finding['verdict']}: {finding['title']}")
-        for name, key in (("paper", "paper"), ("here", "found")):
-            if finding[key]:
-                say(_wrapped(f"      {name:<6}", finding[key]))
-    for run in data["runs"]:
-        if run["status"] == "failed":
-            say(_wrapped("  FAILED    ", f"{run['id']} ({run['label']}): {run['message']}"))
-    for problem in data["problems"]:
+    for finding in data.findings:
+        say(f"    {finding.verdict}: {finding.title}")
+        for name, text in (("paper", finding.paper), ("here", finding.found)):
+            if text:
+                say(_wrapped(f"      {name:<6}", text))
+    reasons = data.reasons()
+    if reasons:
+        say("  no value")
+    for what, why in reasons:
+        say(_wrapped("    ", f"{what}: {why}"))
+    for run in data.runs:
+        if run.status == "failed":
+            say(_wrapped("  FAILED    ", f"{run.id} ({run.label}): {run.message}"))
+    for problem in data.problems:
         say(_wrapped("  PROBLEM   ", problem))
     if any(job.status == "failed" and job.reused for job in jobs):
         say("  A run that failed is not tried again with the same input; --redo does so.")

@@ -1,4 +1,4 @@
-"""TOML tables that are looked at key by key, so that every mistake is found with its place."""
+"""TOML files, and mistakes in them with their place."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Problems:
 
     def __init__(self, file: str, lines: Mapping[Key, int] | None = None) -> None:
         self.file = file
-        self.lines = dict(lines or {})
+        self.lines = {_dotted(place): line for place, line in (lines or {}).items()}
         self.list: list[str] = []
 
     def add(
@@ -54,11 +54,20 @@ class Problems:
         if text not in self.list:
             self.list.append(text)
 
+    def known(self, place: Key, found: Iterable[str], names: Iterable[str], what: str) -> list[str]:
+        """Those of the names found that there are; complain about the others."""
+        there = list(names)
+        found = list(found)
+        for name in found:
+            if name not in there:
+                self.add(place, f"unknown {what}{nearest(name, there)}", name, there)
+        return [name for name in found if name in there]
+
     def where(self, place: Key) -> str:
         """File, line, table and key."""
-        line = next(
-            (self.lines[place[:n]] for n in range(len(place), 0, -1) if place[:n] in self.lines), 0
-        )
+        parts = _dotted(place).split(".")
+        starts = (".".join(parts[:n]) for n in range(len(parts), 0, -1))
+        line = next((self.lines[start] for start in starts if start in self.lines), 0)
         words: list[str] = []
         for part in place:
             if isinstance(part, int):
@@ -70,6 +79,11 @@ class Problems:
     def stop_if_any(self) -> None:
         if self.list:
             raise StudyError(self.list)
+
+
+def _dotted(place: Key) -> str:
+    """The same whether the key is written as "a.b" or as b in the table a."""
+    return ".".join(map(str, place))
 
 
 def _short(value: object) -> str:
@@ -118,86 +132,3 @@ def key_lines(text: str) -> dict[Key, int]:
 
 def _names(text: str) -> list[str]:
     return [name.strip("\"'") for name in re.findall(_NAME, text)]
-
-
-class Table:
-    """A table of the file; complains about what is wrong and goes on with a default."""
-
-    def __init__(self, data: Mapping[str, Any], place: Key, problems: Problems) -> None:
-        self.data = data
-        self.place = place
-        self.problems = problems
-
-    def at(self, *key: Any) -> Key:
-        return (*self.place, *key)
-
-    def complain(
-        self, key: str, what: str, found: object = None, allowed: str | Iterable[str] = ""
-    ) -> None:
-        self.problems.add(self.at(key), what, found, allowed)
-
-    def only(self, known: Iterable[str]) -> None:
-        """Complain about keys that nobody knows."""
-        names = list(known)
-        for key in self.data:
-            if key not in names:
-                self.complain(key, f"unknown key{nearest(key, names)}", allowed=names)
-
-    def text(self, key: str, default: str = "", required: bool = False) -> str:
-        value = self.data.get(key)
-        if value is None:
-            if required:
-                self.problems.add(self.place or (key,), f"the key {key} is missing")
-            return default
-        if not isinstance(value, str):
-            self.complain(key, "must be a text", value)
-            return default
-        if required and not value.strip():
-            self.complain(key, "must not be empty")
-        return value
-
-    def name(self, key: str) -> str:
-        """A required text of a to z, 0 to 9 and _."""
-        value = self.text(key, required=True)
-        if value and not re.fullmatch(r"[a-z0-9_]{1,60}", value):
-            self.complain(key, "is no name", value, "up to 60 of a to z, 0 to 9 and _")
-        return value
-
-    def boolean(self, key: str, default: bool) -> bool:
-        value = self.data.get(key, default)
-        if not isinstance(value, bool):
-            self.complain(key, "must be true or false", value)
-            return default
-        return value
-
-    def texts(self, key: str) -> list[str]:
-        """A list of texts, or a single one."""
-        value = self.data.get(key, [])
-        items = [value] if isinstance(value, str) else value
-        if not isinstance(items, list) or not all(isinstance(item, str) for item in items):
-            self.complain(key, "must be a list of texts", value)
-            return []
-        return list(items)
-
-    def table(self, key: str) -> Table:
-        value = self.data.get(key, {})
-        if not isinstance(value, Mapping):
-            self.complain(key, "must be a table", value, f"[{key}] with keys below it")
-            value = {}
-        return Table(value, self.at(key), self.problems)
-
-    def tables(self, key: str) -> list[Table]:
-        value = self.data.get(key, [])
-        if not isinstance(value, list) or not all(isinstance(item, Mapping) for item in value):
-            self.complain(key, "must be a list of tables", allowed=f"[[{key}]] before each")
-            return []
-        return [Table(item, self.at(key, k), self.problems) for k, item in enumerate(value)]
-
-    def choices(self, key: str, known: Iterable[str], what: str) -> list[str]:
-        """A list of texts that must be among those known."""
-        names = list(known)
-        found = self.texts(key)
-        for item in found:
-            if item not in names:
-                self.complain(key, f"unknown {what}{nearest(item, names)}", item, names)
-        return [item for item in found if item in names]

@@ -31,11 +31,18 @@ class Column:
 
 
 @dataclass(frozen=True)
+class Missing:
+    """Stands for a value that cannot be had."""
+
+    reason: str
+
+
+@dataclass(frozen=True)
 class Measure:
     """A group of columns measured together; `columns` has an entry for each key it returns."""
 
     columns: Mapping[str, Column]
-    take: Callable[[Run, State], dict[str, Value]]  # None where a value cannot be had
+    take: Callable[[Run, State], Mapping[str, Value | Missing]]
 
 
 @dataclass(frozen=True)
