@@ -88,13 +88,8 @@ contains
     parts%key = name(last + 1:)
   end subroutine split
 
-<<<<<<< HEAD
   !> Whether a name without a key is meant: of a group, or of one among several of its kind, which
   !> is no key of it.
-=======
-  !> Whether the name is that of a group without a key: of the group itself, or of one of several of
-  !> its kind; the part after the dot is then not a key.
->>>>>>> english
   pure logical function is_group(name, list)
     character(*),     intent(in) :: name
     type(key_list_t), intent(in) :: list
