@@ -121,8 +121,8 @@ contains
     description%lower = model%body%lower
     description%upper = model%body%upper
     description%steps = schedule%steps
-    description%position = model%body%position
-    description%volume = model%body%volume
+    description%position = model%points%position(model%operators%storage%row, :)
+    description%volume = model%points%volume(model%operators%storage%row)
     description%boundary = model%body%boundary
     if (size(model%materials%remembered()) > 0) &
       description%yield_stress = model%strength(model%operators%storage%row)
@@ -248,8 +248,8 @@ contains
     checkpoint%ledger_blocks(:, 2) = ledger%damping
     checkpoint%ledger_blocks(:, 3) = ledger%frame_work
     checkpoint%input = record%values
-    checkpoint%position = model%body%position
-    checkpoint%volume = model%body%volume
+    checkpoint%position = model%points%position(model%operators%storage%row, :)
+    checkpoint%volume = model%points%volume(model%operators%storage%row)
     checkpoint%boundary = model%body%boundary
     kept = state
     call kept%gather(model%operators%storage%row)
