@@ -129,6 +129,7 @@ contains
     type(result_t),     intent(inout) :: result
     real(wp),           intent(in)    :: values(:)   !! in the order of the columns
     type(error_list_t), intent(inout) :: errors
+    real(wp) :: time
 
     if (result%rows_written + result%waiting >= result%places%rows) then
       call errors%add('there is no place for another row of the history', where=result%path)
@@ -136,8 +137,9 @@ contains
     end if
     result%waiting = result%waiting + 1
     result%bunch_of(:, result%waiting) = values
-    if (result%waiting == 1) result%waiting_since = now()
-    if (result%waiting == bunch .or. now() - result%waiting_since > patience) &
+    time = now()
+    if (result%waiting == 1) result%waiting_since = time
+    if (result%waiting == bunch .or. time - result%waiting_since > patience) &
       call write_rows(result, errors)
   end subroutine add_row
 
