@@ -15,6 +15,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from pydantic import TypeAdapter, ValidationError
+
 from ..read.errors import RequestError
 from .jobs import write_whole
 from .program import NAME, Program, ending
@@ -22,6 +24,7 @@ from .program import NAME, Program, ending
 UNSET = "unset"  # as the value of a key: it is taken out
 KEPT = "inputs.json"  # beside the results: figures are drawn anew without the program
 
+_TEXTS = TypeAdapter(dict[str, str])
 _LONGEST = 60  # bytes of a setting that a message of the program shows
 
 
@@ -162,8 +165,8 @@ class Inputs:
         """Take up what is kept of this study."""
         if self._kept_in is not None:
             try:
-                self._texts = json.loads((self._kept_in(study) / KEPT).read_bytes())
-            except (OSError, ValueError):
+                self._texts = _TEXTS.validate_json((self._kept_in(study) / KEPT).read_bytes())
+            except (OSError, ValidationError):
                 self._texts = {}
 
     def keep(self, folder: Path) -> None:
