@@ -117,9 +117,15 @@ def test_expressions_set_values_of_the_namelist(load: Any) -> None:
     assert "&pressure\n  name = 'left'\n  side = 'left'\n  value = 100000.0\n" in text
     assert "history_count = 70" not in text
     assert "A base" not in text
-    assert "checkpoint_every = 5.0" in load(
-        HEAD + "[set]\n'output.checkpoint_every' = 5\n'run.title' = 'Mine'\n"
-    ).runs[0].input_text("trial", "Trial", "x").replace("title = 'Mine'\n", "")
+
+
+def test_a_title_and_checkpoints_that_are_asked_for_are_kept(load: Any) -> None:
+    changes = "[set]\n'output.checkpoint_every' = 0\n'run.title' = 'Mine'\n"
+    text = load(HEAD + changes).runs[0].input_text("trial", "Trial", "x")
+    assert "\n  checkpoint_every = 0.0\n" in text
+    assert "\n  title = 'Mine'\n" in text
+    base = BASE.replace("&output", "&output checkpoint_every = 5.0,")
+    assert "checkpoint_every = 5.0" in load(HEAD, base).runs[0].input_text("trial", "Trial", "x")
 
 
 def test_cases_are_combined_with_parameters(load: Any) -> None:
@@ -372,6 +378,20 @@ def test_a_file_of_points_must_be_there(wrong: Any) -> None:
         line.startswith("line 3, base: the base has a mistake: line 4, &body file: the file does")
         for line in wrong(HEAD, base)
     )
+
+
+def test_a_file_of_points_may_lie_beside_the_study(load: Any, tmp_path: Path) -> None:
+    points = [
+        f"{0.1 * i} {0.1 * j} 0.01" + (" bottom" if j < 3 else " top" if j > 8 else "")
+        for i in range(6)
+        for j in range(12)
+    ]
+    (tmp_path / "points.txt").write_text("\n".join(points) + "\n")
+    (tmp_path / "input").mkdir()
+    base = BASE.replace("&body ", "&body shape = 'file', file = 'points.txt', ")
+    (tmp_path / "input" / "base.nml").write_text(base)
+    (run,) = load(HEAD.replace("base.nml", "input/base.nml")).runs
+    assert run.files == {"points.txt": tmp_path / "points.txt"}
 
 
 def test_what_is_no_toml_is_one_mistake(wrong: Any, inputs: Inputs, tmp_path: Path) -> None:
