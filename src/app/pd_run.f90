@@ -10,7 +10,7 @@ module pd_run
   use pd_input, only: read_input
   use pd_input_types, only: input_t
   use pd_ledger, only: ledger_t, new_ledger
-  use pd_model, only: model_t, start
+  use pd_model, only: model_t, release_set_up, start
   use pd_observe, only: column_t, moment_at, observation_t, observe
   use pd_record, only: load_checkpoint, observe_state, open_record, record_frame, record_line, &
     record_progress, record_row, record_t, results_in_the_way, same_points
@@ -39,7 +39,7 @@ module pd_run
     type(step_work_t)  :: work
     type(record_t)     :: record
     type(timing_t)     :: timing
-    type(checkpoint_t) :: checkpoint          !! that it goes on from; no rows: a new run
+    type(checkpoint_t) :: checkpoint          !! to continue from; no rows: a new run
     type(error_list_t) :: warnings
     integer(int64) :: last_checkpoint = 0     !! count of the system clock
     integer(int64) :: loop_start = 0          !! count of the system clock
@@ -81,7 +81,7 @@ contains
   end subroutine set_up_run
 
   !> Results of an earlier run are overwritten or continued only on request; a checkpoint is read
-  !> where the run goes on from it.
+  !> if the run continues from it.
   subroutine look_for_earlier_run(options, run, outcome)
     type(options_t), intent(in)    :: options
     type(run_t),     intent(inout) :: run
@@ -127,6 +127,7 @@ contains
         ledger%initial_kinetic_energy = seen%value('kinetic_energy')
         run%checkpoint%clock = run%clock
       end if
+      call release_set_up(model)
     end associate
   end subroutine begin_state
 
@@ -167,6 +168,7 @@ contains
       end if
       call record_progress(run%model, run%state, run%schedule, run%clock, record, errors)
     end associate
+    deallocate (run%model%strength)   ! the state has it, and the result file
     call outcome%end_if_any(errors, exit_file)
     call system_clock(run%last_checkpoint)
     run%loop_start = run%last_checkpoint

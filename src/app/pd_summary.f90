@@ -100,7 +100,7 @@ contains
     if (.not. is_set(field%coefficient_of_variation)) return
     associate (strength => model%strength(model%operators%storage%row), &
       inside => model%body%boundary == 0)
-      spread = spread_of(strength, model%body%volume, inside)
+      spread = spread_of(strength, model%points%volume(model%operators%storage%row), inside)
       weaker = 0
       if (min(material%kinematic_modulus, material%isotropic_modulus) < 0.0_wp) &
         weaker = count(inside .and. strength < material%residual_strength)
@@ -134,14 +134,15 @@ contains
     end do
   end subroutine add_loads
 
-  !> Memory of a run [bytes]: bonds; per point the fields of the state, what is fixed (10 numbers),
-  !> work space (4), a field of a frame on its way to the disk (5).
+  !> Memory of a run [bytes]: operators; per row the fields of the state, what does not change at the
+  !> points (7 numbers), K^-1 (3), A (4), a field of a frame on its way to the disk (5).
   real(wp) function memory(model)
     type(model_t), intent(in) :: model
     type(state_t) :: state
 
-    memory = model%operators%memory() &
-      + real(model%operators%n, wp) * 8.0_wp * real(state%numbers_per_point() + 10 + 4 + 5, wp)
+    state%remembered = model%materials%remembered()
+    memory = model%operators%memory() + real(model%operators%n, wp) * 8.0_wp &
+      * real(state%numbers_per_point() + 7 + 3 + 4 + 5, wp)
   end function memory
 
   !> Estimated wall clock time of the run [s], from the fastest of a few applications of the linear

@@ -31,7 +31,7 @@ contains
     is_set = x > 0.5_wp * unset
   end function is_set
 
-  !> Sum of a block by eight partial sums: one order of additions whatever the compiler does.
+  !> Sum of a block in eight partial sums: the same order of additions with any compiler.
   pure real(wp) function block_sum(x)
     real(wp), intent(in) :: x(n_block)
     integer, parameter :: lanes = 8

@@ -106,7 +106,7 @@ contains
       verify(name(dot + 1:), '0123456789') == 0
   end function is_group
 
-  !> The index of the group; one that stands at most once is added where the file lacks it.
+  !> The index of the group; a group that may be given only once is added if the file lacks it.
   subroutine find_place(parts, list, path, groups, i, errors)
     type(parts_t),                       intent(in)    :: parts
     type(key_list_t),                    intent(in)    :: list

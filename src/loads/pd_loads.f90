@@ -39,7 +39,7 @@ module pd_loads
       real(wp),      intent(in) :: t, t_next       !! [s]
     end function work
 
-    !> What `--check` says of it.
+    !> What `--check` says about it.
     pure function description(self) result(text)
       import :: load_t
       class(load_t), intent(in) :: self

@@ -13,7 +13,7 @@ module pd_model
   implicit none
   private
 
-  public :: model_t, damping_frame_t, start, damping_frame
+  public :: model_t, damping_frame_t, start, damping_frame, release_set_up
 
   !> Everything about a run that does not change while it runs, and the supports with the forces of
   !> the present step.
@@ -40,6 +40,14 @@ module pd_model
   end type damping_frame_t
 
 contains
+
+  !> Give back the memory of what only the set-up needs: points keep it, in rows.
+  subroutine release_set_up(model)
+    type(model_t), intent(inout) :: model
+
+    deallocate (model%body%position, model%body%volume, model%body%part)
+    if (allocated(model%body%place)) deallocate (model%body%place)
+  end subroutine release_set_up
 
   !> Velocity at both ends of the frame in which the damping acts, at time t.
   pure type(damping_frame_t) function damping_frame(model, t) result(frame)

@@ -23,6 +23,7 @@ module pd_storage
     procedure, private :: spread_numbers
     generic :: spread => spread_values, spread_tensors, spread_numbers
     procedure :: point_at
+    procedure :: first_point
   end type storage_t
 
 contains
@@ -107,5 +108,23 @@ contains
 
     point = count(self%row <= row)
   end function point_at
+
+  !> The first point whose row is not before a row; n + 1 where there is none.
+  pure integer function first_point(self, row) result(point)
+    class(storage_t), intent(in) :: self
+    integer,          intent(in) :: row
+    integer :: before, middle
+
+    before = 0
+    point = self%n + 1
+    do while (point - before > 1)
+      middle = (before + point) / 2
+      if (self%row(middle) < row) then
+        before = middle
+      else
+        point = middle
+      end if
+    end do
+  end function first_point
 
 end module pd_storage

@@ -1,9 +1,9 @@
 !> Checkpoints `<stem>_checkpoint.h5`: everything that a run needs to go on.
 !>
 !> A checkpoint is written under another name, synced to the disk, read back, and only then renamed;
-!> the one before it becomes `<stem>_checkpoint_previous.h5`. One of them is whole at any moment. A
-!> sum over all bytes of the file stands in its first 512 bytes, which HDF5 leaves to the user; it
-!> is checked before HDF5 sees the file.
+!> the one before it becomes `<stem>_checkpoint_previous.h5`. One of them is whole at any moment.
+!> The checksum of all bytes is in the first 512 bytes of the file, which HDF5 leaves to the user;
+!> it is checked before HDF5 opens the file.
 module pd_checkpoint
   use, intrinsic :: iso_fortran_env, only: int8, int32
   use pd_clock, only: clock_t

@@ -127,13 +127,16 @@ contains
   subroutine zero_energy(view, values)
     type(points_view_t), intent(in)  :: view
     real(wp),            intent(out), contiguous :: values(:, :)
-    real(wp), allocatable :: z2(:), rows(:, :)
+    real(wp), allocatable :: z2(:)
+    integer :: i
 
-    associate (model => view%model, state => view%state)
-      allocate (z2(model%operators%n))
-      call model%operators%zero_energy_squared(state%displacement, state%displacement_gradient, z2)
-      rows = reshape(sqrt(z2 / model%operators%weight_sum) / model%delta, [size(z2), 1])
-      call take(model, rows, values)
+    associate (operators => view%model%operators, state => view%state)
+      allocate (z2(operators%n))
+      call operators%zero_energy_squared(state%displacement, state%displacement_gradient, z2)
+      do i = 1, size(values, 2)
+        values(1, i) = sqrt(z2(operators%storage%row(i)) &
+          / operators%weight_sum(operators%storage%row(i))) / view%model%delta
+      end do
     end associate
   end subroutine zero_energy
 
@@ -156,21 +159,21 @@ contains
     type(points_view_t), intent(in)  :: view
     procedure(numbers_of_block) :: of_block
     real(wp),            intent(out), contiguous :: values(:, :)   !! (components,points)
-    real(wp), allocatable :: rows(:, :)
     real(wp) :: numbers(n_block, 4)
-    integer  :: block, lo, hi
+    integer  :: block, i, lo
 
-    allocate (rows(view%model%operators%n, size(values, 1)), source=0.0_wp)
-    !$omp parallel do schedule(static) default(none) private(block, lo, hi, numbers) &
-    !$omp shared(view, rows)
+    !$omp parallel do schedule(static) default(none) private(block, i, lo, numbers) &
+    !$omp shared(view, values)
     do block = 1, view%model%blocks%count
       lo = view%model%blocks%lo(block)
-      hi = view%model%blocks%hi(block)
       call of_block(view, block, numbers)
-      rows(lo:hi, :) = numbers(:hi - lo + 1, :size(rows, 2))
+      associate (storage => view%model%operators%storage)
+        do i = storage%first_point(lo), storage%first_point(view%model%blocks%hi(block) + 1) - 1
+          values(:, i) = numbers(storage%row(i) - lo + 1, :size(values, 1))
+        end do
+      end associate
     end do
     !$omp end parallel do
-    call take(view%model, rows, values)
   end subroutine take_blocks
 
   !> Cauchy stress; 0 at a point that has failed (det F <= 0).

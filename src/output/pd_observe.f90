@@ -1,8 +1,7 @@
 !> What a run tells about itself: one number per column of the history.
 !>
-!> A column says how its value comes about, and what it is called; which columns there are stands
-!> in `pd_history_columns`. The blocks of points are gone through once, all columns of a block
-!> while it is in the cache.
+!> A column knows its name, and how its value is found; `pd_history_columns` lists all columns. The
+!> blocks of rows are visited once, for all columns of a block while it is in the cache.
 !> Source: doc/theory.md, section 10.
 module pd_observe
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
@@ -152,7 +151,7 @@ contains
         values(k) = model%blocks%largest(parts(k, :))
       case (smallest)
         values(k) = model%blocks%smallest(parts(k, :))
-      case default   ! no way to join them
+      case default   ! not one of them: not a number
         values(k) = ieee_value(1.0_wp, ieee_quiet_nan)
       end select
     end do

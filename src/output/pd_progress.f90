@@ -38,7 +38,7 @@ module pd_progress
     type(output_file_t) :: log
     logical  :: on_screen = .false.          !! whether the screen is written to
     logical  :: terminal = .false.           !! whether a line is rewritten there
-    logical  :: line_shown = .false.         !! whether such a line stands there
+    logical  :: line_shown = .false.         !! whether such a line is on the screen
     integer  :: tenths = 0                   !! tenths of the run that have been reported
     real(wp) :: last_rewrite = 0.0_wp, last_line = 0.0_wp   !! wall clock [s]
     integer  :: last_step = -1               !! the step and wall clock of the last rate

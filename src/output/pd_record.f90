@@ -121,8 +121,8 @@ contains
     description%lower = model%body%lower
     description%upper = model%body%upper
     description%steps = schedule%steps
-    description%position = model%body%position
-    description%volume = model%body%volume
+    description%position = model%points%position(model%operators%storage%row, :)
+    description%volume = model%points%volume(model%operators%storage%row)
     description%boundary = model%body%boundary
     if (size(model%materials%remembered()) > 0) &
       description%yield_stress = model%strength(model%operators%storage%row)
@@ -223,7 +223,7 @@ contains
     call say(record%progress, text, errors)
   end subroutine record_line
 
-  !> Write a checkpoint of the state after a step, and before it the rows that it counts.
+  !> Write a checkpoint of the state after a step, but first the rows of the history before it.
   subroutine save_checkpoint(model, state, ledger, clock, record, errors)
     type(model_t),      intent(in)    :: model
     type(state_t),      intent(in)    :: state
@@ -248,8 +248,8 @@ contains
     checkpoint%ledger_blocks(:, 2) = ledger%damping
     checkpoint%ledger_blocks(:, 3) = ledger%frame_work
     checkpoint%input = record%values
-    checkpoint%position = model%body%position
-    checkpoint%volume = model%body%volume
+    checkpoint%position = model%points%position(model%operators%storage%row, :)
+    checkpoint%volume = model%points%volume(model%operators%storage%row)
     checkpoint%boundary = model%body%boundary
     kept = state
     call kept%gather(model%operators%storage%row)

@@ -19,6 +19,7 @@ module pd_result
   use pd_run_description, only: run_description_t, schema, schema_version, write_description
   use pd_state, only: state_t
   use pd_system, only: remove_file
+  use pd_timing, only: now
   use pd_xdmf, only: write_xdmf, xdmf_grid
   implicit none
   private
@@ -34,7 +35,8 @@ module pd_result
   end type places_t
 
   !> Rows that are written together.
-  integer, parameter :: bunch = 100
+  integer, parameter :: bunch = 500
+  real(wp), parameter :: patience = 1.0_wp   !! how long they wait at most [s]
 
   !> A result file of a run that is going on; the file itself is closed between calls.
   type :: result_t
@@ -49,6 +51,7 @@ module pd_result
     character(:), allocatable :: grids !! of these frames, for the XDMF file
     integer :: rows_written = 0
     integer,  private :: waiting = 0                   !! rows not written yet
+    real(wp), private :: waiting_since = 0.0_wp        !! clock at the first of these rows [s]
     real(wp), allocatable, private :: bunch_of(:, :)   !! these rows (columns,rows)
   end type result_t
 
@@ -133,7 +136,9 @@ contains
     end if
     result%waiting = result%waiting + 1
     result%bunch_of(:, result%waiting) = values
-    if (result%waiting == bunch) call write_rows(result, errors)
+    if (result%waiting == 1) result%waiting_since = now()
+    if (result%waiting == bunch .or. now() - result%waiting_since > patience) &
+      call write_rows(result, errors)
   end subroutine add_row
 
   !> Write the rows that wait.

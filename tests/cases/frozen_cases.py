@@ -49,6 +49,17 @@ PLATENS = """\
 &boundary name = 'top', side = 'top', contact = 'smooth', velocity = 0.0, -0.01 /
 &integration final_strain = 0.008, damping = 5.0e5, damping_frame = 'platens' /
 """
+SIDEWAYS = """\
+&boundary name = 'left', side = 'left' /
+&boundary name = 'right', side = 'right', contact = 'smooth', velocity = -0.01, 0.0 /
+&integration final_strain = 0.008, damping = 5.0e5, damping_frame = 'platens' /
+"""
+LAYERS = """\
+&body x_min = 0.5, x_max = 0.8, y_min = 0.0, y_max = 0.4, material = 'rock' /
+&body x_min = 0.0, x_max = 0.5, y_min = 0.6, y_max = 1.0, material = 'rock' /
+&material name = 'rock', model = 'elastic', density = 2500.0, youngs_modulus = 80.0e6
+  poissons_ratio = 0.2 /
+"""
 PATCH = "&imperfection amplitude = 0.1, x = 0.0, y = 0.3, radius = 0.15 /\n"
 CONTROL = "&stabilisation method = 'silling', factor = 0.02 /\n"
 FIELD = "&random_field coefficient_of_variation = 0.2, correlation_length = 0.3, seed = 3 /\n"
@@ -105,8 +116,10 @@ CASES = {
     "constant": BODY.replace("horizon =", "influence = 'constant', horizon =") + PLATENS + PATCH,
     "conical": BODY.replace("horizon =", "influence = 'conical', horizon =") + PLATENS + PATCH,
     "cloud": CLOUD + PLATENS + PATCH + CONTROL,
+    "sideways": BODY + SIDEWAYS + PATCH,
+    "materials": BODY.replace("&material", "&material name = 'soil',") + LAYERS + TABLES + CONTROL,
 }
-RESTARTED = ("field", "loaded", "cloud")
+RESTARTED = ("field", "loaded", "cloud", "materials")
 
 
 def cloud():

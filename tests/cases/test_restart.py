@@ -131,7 +131,8 @@ def test_a_run_that_was_killed_goes_on_from_its_last_checkpoint(
 
 
 def test_a_run_killed_between_checkpoints_keeps_the_rows_of_full_bunches(program, tmp_path):
-    process = begin(program, tmp_path, LONG.replace("frame_count = 20", "frame_count = 1"))
+    text = LONG.replace("frame_count = 20", "frame_count = 1")
+    process = begin(program, tmp_path, text.replace("history_count = 400", "history_count = 1500"))
     assert stop(process, signal.SIGKILL, tmp_path, BUNCH + 20) == -9
     assert stored_rows(tmp_path / "out") >= BUNCH
 
