@@ -19,8 +19,8 @@ from perigeo_post.study.expressions import (
     Numbers,
 )
 from perigeo_post.study.findings import Finding, TableRow, evaluate
+from perigeo_post.study.inputs import InputError, read_values, said_of, setting_of
 from perigeo_post.study.jobs import Job, Record
-from perigeo_post.study.namelist import NamelistError, file_names, parse_namelist
 from perigeo_post.study.program import Check, find_program, message_of, read_check
 from perigeo_post.study.progress import Progress, duration, steps_done
 from perigeo_post.study.runner import weight
@@ -199,52 +199,70 @@ def test_numbers_that_are_missing_are_no_result() -> None:
     assert evaluate(finding({"n": "'text'"}, "{n:.1f}", "1 > 0"), ROWS).verdict == "no result"
 
 
-# ---- namelists -------------------------------------------------------------------------------
+# ---- inputs ----------------------------------------------------------------------------------
 
-NAMELIST = """\
-! comment with a ' and a /
-&RUN Title = 'it''s a / "title"', name="n" /  ! done
-&body file='points.txt'
-  x_max = 3*1.0d-1 2.0, , vertices = 0.0
-  1.0 /
-&output frame_strains = 2*0.5, 1d-2, history_count=100/
+PRINTED = """\
+&run
+  name = 'it''s = b'
+/
+&output
+  frame_strains = 0.5, 1.0e-2
+  ! ramp_time = 0.0
+/
 """
 
 
-def test_a_namelist_is_taken_apart_as_the_program_does() -> None:
-    found = parse_namelist(NAMELIST)
-    assert [group.name for group in found.groups] == ["run", "body", "output"]
-    assert found.groups[0].entries == {"title": ["'it''s a / \"title\"'"], "name": ['"n"']}
-    assert found.groups[0].label == "n"
-    assert found.groups[1].entries["x_max"] == ["3*1.0d-1", "2.0"]
-    assert found.groups[1].entries["vertices"] == ["0.0", "1.0"]
-    assert found.numbers("output", "frame_strains") == [0.5, 0.5, 0.01]
+def test_what_the_program_prints_is_read_and_written() -> None:
+    found = read_values(PRINTED)
+    assert found.text() == PRINTED
+    assert found.numbers("output", "frame_strains") == [0.5, 0.01]
     assert found.numbers("output", "nothing") == []
-    assert found.numbers("run", "name") == []
-    assert file_names(found) == [(found.groups[1], "points.txt")]
-    assert parse_namelist(found.text()).text() == found.text()
-    assert parse_namelist("\ufeff&run /\r\n! end").text() == "&run\n/\n"
+    found.put("run", "name", "a'b")
+    found.put("run", "title", "T")
+    found.put("body", "x_min", 1)
+    text = found.text(leave_out=("output.frame_strains",))
+    assert text.startswith("&run\n  name = 'a''b'\n  title = 'T'\n/\n&output\n  ! ramp_time")
+    assert text.endswith("&body\n  x_min = 1\n/\n")
+    assert "frame_strains" not in text
 
 
-def test_changes_find_groups_by_name_or_number() -> None:
-    found = parse_namelist("&boundary name = 'top' /\n&run /\n&boundary name = 'left' /\n")
-    found.change("boundary.LEFT.side", "it's")
-    found.change("boundary.1.side", "top")
-    found.change("boundary.right.velocity", [0, 1.5])
-    found.change("output.flag", True)
-    assert found.text() == (
-        "&boundary\n  name = 'top'\n  side = 'top'\n/\n&run\n/\n"
-        "&boundary\n  name = 'left'\n  side = 'it''s'\n/\n"
-        "&boundary\n  name = 'right'\n  velocity = 0, 1.5\n/\n"
-        "&output\n  flag = .true.\n/\n"
-    )
-    found.change("boundary.top", False)
-    found.change("boundary.right.velocity", "unset")
-    assert [group.label for group in found.named("boundary")] == ["left", "right"]
-    found.change("boundary", False)
-    assert not found.named("boundary")
-    with pytest.raises(NamelistError, match="on one line"):
-        found.change("run.title", "a\nb")
+@pytest.mark.parametrize(
+    ("place", "value", "setting"),
+    [
+        ("Body.x_min", 1, "body.x_min=1"),
+        ("boundary.top.velocity", [0, -0.02], "boundary.top.velocity=0, -0.02"),
+        ("run.title", "it's", "run.title='it''s'"),
+        ("body.x_min", "unset", "body.x_min="),
+        ("imperfection", False, "imperfection="),
+        ("boundary.top", False, "boundary.top="),
+        ("body.a.flag", True, "body.a.flag=.true."),
+    ],
+)
+def test_a_change_becomes_a_setting_of_the_program(place: str, value: Any, setting: str) -> None:
+    assert setting_of(place, value) == setting
+
+
+@pytest.mark.parametrize(
+    ("place", "value", "words"),
+    [
+        ("run.title", "a\nb", "on one line"),
+        ("body", 1, "is a group: only false"),
+        ("body.x_min", [], "an empty list"),
+        ("body.x_min", None, "neither a number nor a text"),
+        ("a.b.c.d", 1, "must be group.key"),
+        ("a b.c", 1, "must be group.key"),
+    ],
+)
+def test_a_change_that_cannot_be_made_is_refused(place: str, value: Any, words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        setting_of(place, value)
+
+
+def test_a_message_of_the_program_is_told_to_be_about_a_setting() -> None:
+    assert said_of("a.b=1", "--set a.b=1: out of range") == "out of range"
+    assert said_of("a.b=1", "--set a.b=12: out of range") is None
+    assert said_of("a.b=1", "line 2: a.b=1: what") is None
+    assert said_of("a.b=" + "x" * 80, f"--set a.b={'x' * 56}...: no") == "no"
 
 
 # ---- the program -----------------------------------------------------------------------------

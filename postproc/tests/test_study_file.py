@@ -10,6 +10,8 @@ import pytest
 
 from perigeo_post.draw.style import new_figure
 from perigeo_post.study.file import Kinds, Study, load_study
+from perigeo_post.study.inputs import Inputs
+from perigeo_post.study.program import Program, find_program
 from perigeo_post.study.tables import OPTIONS
 from perigeo_post.study.toml import StudyError, key_lines
 from perigeo_post.study.types import Column, Drawing, Measure
@@ -19,11 +21,13 @@ BASE = """\
 &run name = 'base', title = 'A base' /
 &discretisation spacing = 0.1, horizon = 0.25 /
 &body x_min = 0.0, x_max = 0.5, y_min = 0.0, y_max = 1.0 /
-&material model = 'j2', youngs_modulus = 50.0e6 /   ! [Pa]
+&material model = 'j2', density = 2000.0, youngs_modulus = 50.0e6, poissons_ratio = 0.3   ! [SI]
+  yield_stress = 0.15e6, residual_strength = 15.0e3 /
 &boundary name = 'bottom', side = 'bottom' /
-&boundary name = 'top', side = 'top', velocity = 0.0, -0.01 /
-&imperfection amplitude = 1.0e-3 /
-&output frame_strains = 0.004, 0.01 /
+&boundary name = 'top', side = 'top', contact = 'smooth', velocity = 0.0, -0.01 /
+&integration final_strain = 0.01, damping = 5.0e5, damping_frame = 'platens' /
+&imperfection amplitude = 1.0e-3, x = 0.0, y = 0.3, radius = 0.11 /
+&output frame_strains = 0.004, 0.01, history_count = 70 /
 """
 KINDS = Kinds(
     measures={
@@ -38,8 +42,18 @@ KINDS = Kinds(
 HEAD = 'name = "trial"\ntitle = "Trial"\nbase = "base.nml"\nmeasures = ["band"]\n'
 
 
+@pytest.fixture(scope="module")
+def program() -> Program:
+    return find_program(None, Path(__file__))
+
+
 @pytest.fixture
-def load(tmp_path: Path) -> Any:
+def inputs(program: Program) -> Inputs:
+    return Inputs(lambda: program)
+
+
+@pytest.fixture
+def load(tmp_path: Path, inputs: Inputs) -> Any:
     (tmp_path / "base.nml").write_text(BASE)
 
     def read(text: str, base: str | None = None, kinds: Kinds = KINDS) -> Study:
@@ -47,7 +61,7 @@ def load(tmp_path: Path) -> Any:
         path.write_text(text)
         if base is not None:
             (tmp_path / "base.nml").write_text(base)
-        return load_study(path, kinds)
+        return load_study(path, kinds, inputs)
 
     return read
 
@@ -86,22 +100,32 @@ def test_expressions_set_values_of_the_namelist(load: Any) -> None:
         '[set]\n"discretisation.spacing" = "=0.2 / m"\n'
         '"boundary.top.velocity" = [0.0, "=speed * half"]\n'
         "\"boundary.top.contact\" = \"='rough' if rough else 'smooth'\"\n"
-        '"material.model" = "unset"\nimperfection = false\n'
+        '"output.history_count" = "unset"\nimperfection = false\n'
         '[set.discretisation]\nlayout = "cells"\n'
         '[set.pressure.left]\nside = "left"\nvalue = 1e5\n'
     )
     (run,) = study.runs
     assert run.parameters == {"m": 4, "speed": -0.02, "half": 2.0, "rough": True}
     text = run.input_text("trial", "Trial", "results/trial/runs/x")
-    assert "  spacing = 0.05\n  horizon = 0.25\n  layout = 'cells'\n" in text
-    assert "  velocity = 0.0, -0.04\n  contact = 'rough'\n" in text
-    assert "model" not in text
-    assert "imperfection" not in text
-    assert "&pressure\n  name = 'left'\n  side = 'left'\n  value = 100000.0\n/\n" in text
-    assert "  name = 'm_4_speed_m0p02'\n" in text
-    assert "  title = 'Trial: m = 4, speed = -0.02'\n" in text
+    for line in (
+        "spacing = 0.05", "horizon = 0.25", "layout = 'cells'", "velocity = 0.0, -0.04",
+        "contact = 'rough'", "amplitude = 0.0", "name = 'm_4_speed_m0p02'",
+        "title = 'Trial: m = 4, speed = -0.02'", "output_dir = 'results/trial/runs/x'",
+        "checkpoint_every = 60.0",
+    ):  # fmt: skip
+        assert f"\n  {line}\n" in text, line
+    assert "&pressure\n  name = 'left'\n  side = 'left'\n  value = 100000.0\n" in text
+    assert "history_count = 70" not in text
     assert "A base" not in text
-    assert "checkpoint_every = 60.0" in text
+
+
+def test_a_title_and_checkpoints_that_are_asked_for_are_kept(load: Any) -> None:
+    changes = "[set]\n'output.checkpoint_every' = 0\n'run.title' = 'Mine'\n"
+    text = load(HEAD + changes).runs[0].input_text("trial", "Trial", "x")
+    assert "\n  checkpoint_every = 0.0\n" in text
+    assert "\n  title = 'Mine'\n" in text
+    base = BASE.replace("&output", "&output checkpoint_every = 5.0,")
+    assert "checkpoint_every = 5.0" in load(HEAD, base).runs[0].input_text("trial", "Trial", "x")
 
 
 def test_cases_are_combined_with_parameters(load: Any) -> None:
@@ -116,18 +140,18 @@ def test_cases_are_combined_with_parameters(load: Any) -> None:
     assert study.runs[0].label == "rough, both, m = 1"
     assert study.runs[2].label == "contact = smooth, m = 1"
     assert study.runs[0].parameters == {"m": 1, "contact": "rough"}
-    assert "contact" in study.runs[0].namelist.text()
-    assert "contact" not in study.runs[2].namelist.text()
+    assert study.runs[0].values.text().count("contact = 'rough'") == 2
+    assert study.runs[2].values.text().count("contact = 'rough'") == 1
 
 
 def test_series_add_to_what_stands_at_the_top(load: Any) -> None:
     study = load(
-        HEAD + 'label = "{m} of {case}"\nstrain = 0.004\n[parameters]\nm = [1, 2]\nn = 5\n'
-        '[set]\n"material.youngs_modulus" = 1.0\n"discretisation.horizon" = "=n"\n'
+        HEAD + 'label = "{m} of {case}"\nstrain = 0.004\n[parameters]\nm = [1, 2]\nn = 0.5\n'
+        '[set]\n"material.youngs_modulus" = 1.0e6\n"discretisation.horizon" = "=n"\n'
         '[[series]]\nname = "one"\n'
         '[[series]]\nname = "two"\ntitle = "Two"\nstrain = 0.01\nmeasures = ["peak"]\n'
-        'line = [[0, 0.5], ["=m", 1.5]]\nlabel = "m = {m}"\nparameters = { m = [3], n = 7 }\n'
-        'set = { "material.youngs_modulus" = 2.0 }\n'
+        'line = [[0, 0.5], ["=m", 1.5]]\nlabel = "m = {m}"\nparameters = { m = [3], n = 0.7 }\n'
+        'set = { "material.youngs_modulus" = 2.0e6 }\n'
     )
     assert [run.id for run in study.runs] == ["one_m_1", "one_m_2", "two_m_3"]
     assert [run.label for run in study.runs] == ["1 of ", "2 of ", "m = 3"]
@@ -137,8 +161,8 @@ def test_series_add_to_what_stands_at_the_top(load: Any) -> None:
     assert flat == ((0.0, 0.5), (1.0, 1.5))
     assert study.runs[0].measures == ("band",)
     assert study.runs[2].measures == ("band", "peak")
-    assert "youngs_modulus = 2.0" in study.runs[2].namelist.text()
-    assert "horizon = 7" in study.runs[2].namelist.text()
+    assert "youngs_modulus = 2000000.0" in study.runs[2].values.text()
+    assert "horizon = 0.7" in study.runs[2].values.text()
     assert study.series == (("one", "one"), ("two", "Two"))
 
 
@@ -225,12 +249,18 @@ FINDING = '[[finding]]\ntitle = "F"\nfound = "{a}"\n'
         (HEAD + "[[case]]\nvalue = { m = 1 }\n", "line 6, case 1, value: unknown key, did you"),
         (HEAD + "[set]\n'run.name' = 'a'\n", 'line 6, set, "run.name": is set by the study'),
         (HEAD + "[set]\n'a.b.c.d' = 1\n", 'line 6, set, "a.b.c.d": must be group.key'),
-        (HEAD + "[set]\n'boundary.side' = 1\n", "&boundary stands several times; say which: "
-         "boundary.bottom, boundary.top"),
-        (HEAD + "[set]\nimperfections = false\n", "line 6, set, imperfections: there is no group "
-         "to take out, did you mean 'imperfection'?"),
+        (HEAD + "[set]\n'boundary.side' = 1\n", 'line 6, set, "boundary.side": the file has '
+         "several groups of this name; found: 2 groups &boundary; allowed: boundary.name.side"),
+        (HEAD + "[set]\nimperfections = false\n", "line 6, set, imperfections: unknown group, "
+         "did you mean 'imperfection'?; found: imperfections"),
         (HEAD + "[set]\nimperfection = 1\n", "set, imperfection: is a group: only false"),
-        (HEAD + "[set]\n'body.x_mim' = 'unset'\n", "no x_mim to take out, did you mean 'x_min'?"),
+        (HEAD + "[set]\n'body.x_mim' = 'unset'\n", 'line 6, set, "body.x_mim": there is no such '
+         "key to take out"),
+        (HEAD + "[set]\n'body.x_mim' = 1\n", "set, \"body.x_mim\": unknown key, did you mean"),
+        (HEAD + "[parameters]\nrho = [1, -2]\n[set]\n'material.density' = '=rho'\n",
+         'line 8, set, "material.density": out of range; found: -2; allowed: > 0'),
+        (HEAD + "[set]\n'integration.final_strain' = 'unset'\n",
+         "line 3, base: the base with the settings of a run: "),
         (HEAD + "[set]\n'body.x_min' = []\n", "an empty list is no value"),
         (HEAD + "[set]\n'body.x_min' = '=1 +'\n", "'1 +' is no expression"),
         (HEAD + "[set]\n'body.x_min' = '=1 / 0'\n", "'1 / 0': division by zero"),
@@ -305,10 +335,10 @@ def test_what_is_wrong_does_not_hide_what_else_is_wrong(wrong: Any) -> None:
         "line 5, strain: must be a number",
         "line 6, extra: unknown key",
         "line 9, parameters, run: cannot be the name",
-        'line 11, set, "body.x_mim": there is no x_mim to take out',
+        'line 11, set, "body.x_mim": there is no such key to take out',
         'line 12, set, "body.x_min": must be a number, a text or a list of them; found: 2020-01-01',
         "line 14, case 1, label: must be a text; found: 3",
-        'line 15, case 1, set, "body.y_mim": there is no y_mim to take out',
+        'line 15, case 1, set, "body.y_mim": there is no such key to take out',
         "line 17, figure 1, name: is no name",
         "line 19, figure 1, x: must be a text; found: 1",
         'line 20, figure 1, y: unknown column; found: "wdith"',
@@ -329,33 +359,50 @@ def test_what_is_wrong_does_not_hide_what_else_is_wrong(wrong: Any) -> None:
     ("base", "found"),
     [
         ("&run name = 'a'\n", "group &run is not ended by /"),
-        ("run name = 'a' /\n", "line 1: text outside of a group: run"),
-        ("&run\n name 'a' /\n", "line 2: a value without a key in &run"),
-        ("&run\n name = 'a\n/\n", "line 2: a text without its closing quote"),
+        ("run name = 'a' /\n", "line 1: text outside of a group; found: run name"),
+        ("&run\n name 'a' /\n", "line 2: a key without = in &run; found: name 'a'"),
+        ("&run\n name = 'a\n/\n", "line 2: name: a text without its closing quote"),
         ("&run a = 1\n a = 2 /\n", "line 2: &run a is given twice"),
-        ("&run a = 1\n&body /\n", "line 2: group &run is not ended by /"),
+        ("&run a = 1\n&body /\n", "line 1: group &run is not ended by /"),
     ],
 )
 def test_mistakes_of_the_base_are_named(wrong: Any, base: str, found: str) -> None:
-    (line,) = wrong(HEAD, base)
+    line = wrong(HEAD, base)[0]
     assert line.startswith("line 3, base: the base has a mistake: ")
     assert found in line
 
 
 def test_a_file_of_points_must_be_there(wrong: Any) -> None:
     base = BASE.replace("&body ", "&body shape = 'file', file = 'points.txt', ")
-    assert "line 3, base: the file of points is not there" in wrong(HEAD, base)[0]
+    assert any(
+        line.startswith("line 3, base: the base has a mistake: line 4, &body file: the file does")
+        for line in wrong(HEAD, base)
+    )
 
 
-def test_what_is_no_toml_is_one_mistake(wrong: Any, tmp_path: Path) -> None:
+def test_a_file_of_points_may_lie_beside_the_study(load: Any, tmp_path: Path) -> None:
+    points = [
+        f"{0.1 * i} {0.1 * j} 0.01" + (" bottom" if j < 3 else " top" if j > 8 else "")
+        for i in range(6)
+        for j in range(12)
+    ]
+    (tmp_path / "points.txt").write_text("\n".join(points) + "\n")
+    (tmp_path / "input").mkdir()
+    base = BASE.replace("&body ", "&body shape = 'file', file = 'points.txt', ")
+    (tmp_path / "input" / "base.nml").write_text(base)
+    (run,) = load(HEAD.replace("base.nml", "input/base.nml")).runs
+    assert run.files == {"points.txt": tmp_path / "points.txt"}
+
+
+def test_what_is_no_toml_is_one_mistake(wrong: Any, inputs: Inputs, tmp_path: Path) -> None:
     (line,) = wrong(HEAD + "a = \n")
     assert "this is not TOML" in line
     assert "line 5" in line
     with pytest.raises(StudyError, match="cannot be read: No such file"):
-        load_study(tmp_path / "nothing.toml", KINDS)
+        load_study(tmp_path / "nothing.toml", KINDS, inputs)
     (tmp_path / "binary.toml").write_bytes(b"\xff\xfe\x00")
     with pytest.raises(StudyError, match="not a text"):
-        load_study(tmp_path / "binary.toml", KINDS)
+        load_study(tmp_path / "binary.toml", KINDS, inputs)
 
 
 def test_measures_may_not_take_the_name_of_a_parameter(load: Any) -> None:

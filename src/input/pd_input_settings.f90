@@ -73,8 +73,8 @@ contains
     if (equals > 0) name = lower_case(trim(adjustl(text(:equals - 1))))
     parts%value = ''
     if (equals > 0) parts%value = trim(adjustl(text(equals + 1:)))
-    if (equals > 0 .and. is_group(name, list)) then
-      if (parts%value == '') name = name//'.'
+    if (equals > 0 .and. parts%value == '' .and. name /= '') then
+      if (is_group(name, list)) name = name//'.'
     end if
     first = index(name, '.')
     last = index(name, '.', back=.true.)
@@ -88,17 +88,22 @@ contains
     parts%key = name(last + 1:)
   end subroutine split
 
-  !> Whether a name without a key is meant: of a group, or of one among several of its kind, which
-  !> is no key of it.
+  !> Whether a name without a key is meant: of a group, known or not, or of one among several of its
+  !> kind, by its number or by its own name, which is no key of it.
   pure logical function is_group(name, list)
     character(*),     intent(in) :: name
     type(key_list_t), intent(in) :: list
-    integer :: dot
+    integer :: dot, known
 
     dot = index(name//'.', '.')
-    is_group = find_group(list%groups, name(:dot - 1)) > 0
-    if (is_group .and. dot < len(name)) is_group = index(name(dot + 1:), '.') == 0 .and. &
-      find_key(list%keys, name(:dot - 1), name(dot + 1:)) == 0
+    is_group = dot > len(name)
+    if (is_group) return
+    known = find_group(list%groups, name(:dot - 1))
+    if (known == 0 .or. index(name(dot + 1:), '.') > 0) return
+    if (.not. list%groups(known)%repeats) return
+    is_group = (find_key(list%keys, name(:dot - 1), 'name') > 0 .and. &
+                find_key(list%keys, name(:dot - 1), name(dot + 1:)) == 0) .or. &
+      verify(name(dot + 1:), '0123456789') == 0
   end function is_group
 
   !> The index of the group; a group that may be given only once is added if the file lacks it.
@@ -131,13 +136,13 @@ contains
       if (i == 0) call errors%add('the file has no such group', where=parts%place, &
         found=shortened(parts%which), allowed='a name of &'//parts%group//' or 1 to '// &
         integer_text(n))
-    else if (n == 1) then
+    else if (n == 1 .or. (n > 1 .and. parts%key == '')) then
       i = group_of(groups, parts%group, '1')
     else if (n > 1) then
       call errors%add('the file has several groups of this name', where=parts%place, &
         found=integer_text(n)//' groups &'//parts%group, &
         allowed=parts%group//'.name.'//parts%key//' or '//parts%group//'.number.'//parts%key)
-    else if (list%groups(known)%repeats) then
+    else if (list%groups(known)%repeats .or. parts%key == '') then
       call errors%add('the file has no group &'//parts%group, where=parts%place)
     else
       call append(groups, parts%group, path)
@@ -169,15 +174,20 @@ contains
     i = 0
   end function group_of
 
-  !> Take a key out of its group, or the group out of the file.
+  !> Take a key out of its group, or the group out of the file, all of its kind where none is named.
   subroutine take_out(parts, groups, i, errors)
     type(parts_t),                       intent(in)    :: parts
     type(namelist_group_t), allocatable, intent(inout) :: groups(:)
     integer,                             intent(in)    :: i   !! of the group
     type(error_list_t),                  intent(inout) :: errors
+    integer, allocatable :: others(:)
     integer :: k, e
 
-    if (parts%key == '') then
+    if (parts%key == '' .and. parts%which == '') then
+      others = pack([(k, k=1, size(groups))], [(groups(k)%name /= parts%group, k=1, size(groups))])
+      groups = [(groups(others(k)), k=1, size(others))]
+      return
+    else if (parts%key == '') then
       groups = [(groups(k), k=1, i - 1), (groups(k), k=i + 1, size(groups))]
       return
     end if

@@ -161,7 +161,7 @@ def test_a_study_gives_a_table_figures_findings_and_a_report(do):
     for run in data["runs"]:
         text = Path("results/trial", run["input"]).read_text()
         assert "output_dir = 'results/trial/runs/" in text
-        assert f"youngs_modulus = {run['parameters']['E'] * 1e6!r}" in text
+        assert f"youngs_modulus = {run['parameters']['E'] / 10:.1f}e7\n" in text
         assert run["points"] > 50
         assert run["steps"] > 100
         assert run["seconds"] > 0.0
@@ -203,7 +203,7 @@ def test_only_the_run_whose_input_has_changed_is_made_anew(do):
     assert status == 0
     assert {"e_40", "e_60"} == {run for run in before if before[run] == made()[run]}
     assert "1 computed" in words
-    assert "youngs_modulus = 51000000.0" in Path("results/trial/runs/e_50/e_50.nml").read_text()
+    assert "youngs_modulus = 5.1e7" in Path("results/trial/runs/e_50/e_50.nml").read_text()
 
 
 def test_a_new_value_leaves_the_other_runs_alone(do):
@@ -293,16 +293,26 @@ def test_one_failing_run_does_not_stop_the_others(do):
     assert made()["safety_10"] > before["safety_10"]
 
 
-def test_a_run_with_a_wrong_input_is_reported_with_the_words_of_the_program(do):
-    text = STUDY.replace('= "=E * 1e6"', "= \"=E * 1e6 if E > 45 else 'soft'\"")
-    status, words = do(text)
+def test_a_wrong_input_is_reported_with_its_place_and_the_words_of_the_program(do):
+    with pytest.raises(StudyError) as caught:
+        do(STUDY.replace('= "=E * 1e6"', "= \"=E * 1e6 if E > 45 else 'soft'\""))
+    assert caught.value.problems == [
+        'trial.toml, line 11, set, "material.youngs_modulus": text where a number is due; '
+        "found: 'soft'; allowed: > 0 [Pa]"
+    ]
+    assert not Path("results").exists()
+
+
+def test_a_run_whose_model_is_refused_is_reported_with_the_words_of_the_program(
+    do, program, tmp_path
+):
+    no = 'case "$*" in --check*/e_40.nml) echo "perigeo: error: no such thing" >&2; exit 3 ;; esac'
+    status, words = do(program=stand_in(tmp_path / "other", program, before=no))
     assert status == 4
     assert [row["status"] for row in rows()] == ["failed", "done", "done"]
     failed = report()["runs"][0]
-    assert failed["exit_status"] == 2
-    assert "&material youngs_modulus" in failed["message"]
-    assert "soft" in failed["message"]
-    assert "results" not in failed["message"]
+    assert failed["exit_status"] == 3
+    assert failed["message"] == "no such thing"
     assert "FAILED" in words
     # Missing numbers make no verdict out of two of three.
     assert report()["findings"][0]["verdict"] == "agrees in part"
@@ -399,6 +409,8 @@ def test_figures_alone_need_no_program(do, tmp_path):
     assert made() == before
     assert Path("results/trial/peaks.png").exists()
     assert "3 there already" in words
+    with pytest.raises(RequestError, match="the program is not there: "):
+        do(STUDY.replace("60.0", "70.0"), figures_only=True, program=tmp_path / "gone")
 
 
 def test_two_studies_do_not_work_in_one_folder(do):

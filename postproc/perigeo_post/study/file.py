@@ -1,7 +1,7 @@
 """Study files: read, checked as a whole, and turned into runs, figures and findings.
 
-doc/studies.md describes the file. Everything that is wrong is found here, before anything runs,
-except what only the program can tell about a namelist.
+doc/studies.md describes the file. Everything that is wrong is found here, before anything runs;
+what is wrong with the inputs, the program says.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ from typing import Any
 
 from .expressions import nearest
 from .findings import Finding, Known, checked_finding
+from .inputs import Inputs
 from .level import Level, level_of
-from .namelist import Namelist, NamelistError, parse_namelist
 from .plan import PlannedRun, Planner, has_frame
 from .tables import COUNTED, FIGURE_KEYS, FIXED, LAST, StudyTable, read_tables
 from .toml import Key, Problems, StudyError, read_toml
@@ -62,15 +62,16 @@ class Study:
     parameters: tuple[str, ...]
 
 
-def load_study(path: Path, kinds: Kinds) -> Study:
+def load_study(path: Path, kinds: Kinds, inputs: Inputs) -> Study:
     """Read a study file. Raises StudyError with everything that is wrong."""
     data, problems = read_toml(path)
     top = read_tables(data, problems)
     if top is None:
         raise StudyError(problems.list)
-    base_path, base = _base(top, path, problems)
+    base = _base(top, path, problems)
     levels = _levels(top, kinds, problems)
-    planner = Planner(base or Namelist(), [base_path.parent, path.parent, Path()], problems)
+    inputs.begin(top.name)
+    planner = Planner(path.parent / top.base, path, inputs, problems)
     if base is not None:
         for name, level in levels.items():
             planner.add_series(name, level, name if level.place else "", top.name)
@@ -92,7 +93,7 @@ def load_study(path: Path, kinds: Kinds) -> Study:
         name=top.name,
         title=top.title or top.name,
         question=top.question,
-        base=base_path,
+        base=path.parent / top.base,
         series=tuple((name, level.title) for name, level in levels.items()),
         runs=tuple(runs),
         figures=tuple(figures),
@@ -102,19 +103,18 @@ def load_study(path: Path, kinds: Kinds) -> Study:
     )
 
 
-def _base(top: StudyTable, path: Path, problems: Problems) -> tuple[Path, Namelist | None]:
+def _base(top: StudyTable, path: Path, problems: Problems) -> Path | None:
+    """The file of the base; None where it cannot be read."""
     base = path.parent / top.base
     if not top.base:
-        return base, None
+        return None
     try:
-        return base, parse_namelist(base.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        reason = error.strerror if isinstance(error, OSError) else "it is not a text"
-        what = f"the base cannot be read: {reason}"
+        base.read_bytes()
+    except OSError as error:
+        what = f"the base cannot be read: {error.strerror}"
         problems.add(("base",), what, top.base, "relative to this file")
-    except NamelistError as error:
-        problems.add(("base",), f"the base has a mistake: {error}", top.base)
-    return base, None
+        return None
+    return base
 
 
 def _levels(top: StudyTable, kinds: Kinds, problems: Problems) -> dict[str, Level]:
@@ -232,7 +232,7 @@ def _check_strains(
     """The option `strain` of a figure needs frames there."""
     strains = options.get("strain", [])
     for strain in strains if isinstance(strains, list) else [strains]:
-        frames = [run.namelist.numbers("output", "frame_strains") for run in runs]
+        frames = [run.values.numbers("output", "frame_strains") for run in runs]
         if runs and not any(has_frame(one, strain) for one in frames):
             there = ", ".join(f"{one:g}" for one in sorted({f for one in frames for f in one}))
             what = "none of its runs has a frame at this strain"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import hashlib
 import itertools
 import re
@@ -12,10 +13,10 @@ from pathlib import Path
 from typing import Any
 
 from .expressions import Expression, ExpressionError, nearest
+from .inputs import InputError, Inputs, Values, said_of, setting_of, unquoted, written
 from .level import Case, Edit, Level
-from .namelist import Namelist, NamelistError, file_names
 from .tables import OF_THE_STUDY
-from .toml import Problems
+from .toml import Key, Problems
 from .types import State, Value
 
 MOST_RUNS = 1000
@@ -33,37 +34,40 @@ class PlannedRun:
     label: str
     series: str
     parameters: dict[str, Value]
-    namelist: Namelist
-    files: dict[str, Path]  # of points: name beside the namelist -> where it comes from
+    values: Values  # as used
+    given: frozenset[str]  # the keys that the study sets
+    files: dict[str, Path]  # of points: name beside the input -> where it comes from
     state: State
     measures: tuple[str, ...]
 
     @property
     def identity(self) -> str:
         """The same for runs that compute the same: of the input without names and titles."""
-        digest = hashlib.sha256(self.namelist.text(leave_out=_NOT_THE_MODEL).encode())
+        digest = hashlib.sha256(self.values.text(leave_out=_NOT_THE_MODEL).encode())
         for name, path in sorted(self.files.items()):
             digest.update(name.encode() + hashlib.sha256(path.read_bytes()).digest())
         return digest.hexdigest()
 
     def input_text(self, study: str, title: str, folder: str) -> str:
         """The input file of the run, with results in `folder`."""
-        namelist = self.namelist.copy()
-        if not namelist.numbers("output", "checkpoint_every"):
-            namelist.change("output.checkpoint_every", CHECKPOINT_SECONDS)
-        namelist.change("run.name", self.id)
-        namelist.change("run.output_dir", folder)
-        if "title" not in namelist.named("run")[0].entries:
-            namelist.change("run.title", f"{title}: {self.label}"[:200])
-        return f"! Run {self.id} of the study {study}.\n{namelist.text()}"
+        values = copy.deepcopy(self.values)
+        every = values.numbers("output", "checkpoint_every")
+        if "output.checkpoint_every" not in self.given and not any(every):
+            values.put("output", "checkpoint_every", CHECKPOINT_SECONDS)
+        values.put("run", "name", self.id)
+        values.put("run", "output_dir", folder)
+        if "run.title" not in self.given:
+            values.put("run", "title", f"{title}: {self.label}"[:200])
+        return f"! Run {self.id} of the study {study}.\n{values.text()}"
 
 
 class Planner:
     """Makes the runs of a study from its levels."""
 
-    def __init__(self, base: Namelist, folders: list[Path], problems: Problems) -> None:
+    def __init__(self, base: Path, study: Path, inputs: Inputs, problems: Problems) -> None:
         self.base = base
-        self.folders = folders  # where files of points are looked for
+        self.folder = study.parent
+        self.inputs = inputs
         self.problems = problems
         self.runs: list[PlannedRun] = []
 
@@ -104,17 +108,19 @@ class Planner:
         if parameters is None:
             return None
         label = self._label(level, case, number, swept, parameters)
-        namelist, good = self._namelist([*level.edits, *case.edits], parameters)
-        state = self._state(level, parameters, namelist, label or _slug(case, number, swept))
-        if not good or label is None:
+        edits = [*level.edits, *case.edits]
+        values = self._values(edits, parameters)
+        state = self._state(level, parameters, values, label or _slug(case, number, swept))
+        if values is None or label is None:
             return None
         return PlannedRun(
             id=_slug(case, number, swept),
             label=label,
             series=series,
             parameters=parameters,
-            namelist=namelist,
-            files=self._take_files(namelist),
+            values=values,
+            given=frozenset(key.lower() for _, key, _ in edits),
+            files=self._take_files(values),
             state=state,
             measures=tuple(level.measures),
         )
@@ -141,26 +147,41 @@ class Planner:
                 return None
         return found
 
-    def _namelist(
-        self, edits: list[Edit], parameters: Mapping[str, Value]
-    ) -> tuple[Namelist, bool]:
-        """The base with all changes, and whether all could be made."""
-        namelist = self.base.copy()
-        for group in namelist.named("run"):
-            group.entries.pop("title", None)
-        if not namelist.named("run"):
-            namelist.change("run.name", "run")
-            namelist.groups.insert(0, namelist.groups.pop())
+    def _values(self, edits: list[Edit], parameters: Mapping[str, Value]) -> Values | None:
+        """The values of the base with all changes; None where there are mistakes."""
+        # A base without a name is none that the program takes; each run gets its own later.
+        settings: list[tuple[str, Key]] = [("run.name=run", ())]
         good = True
         for place, key, raw in edits:
             try:
                 value = _valued(raw, parameters)
                 if value is not None:
-                    namelist.change(key, value)
-            except (ExpressionError, NamelistError) as error:
+                    settings.append((setting_of(key, value), place))
+            except (ExpressionError, InputError) as error:
                 self.problems.add(place, str(error))
                 good = False
-        return namelist, good
+        try:
+            values = self.inputs.values(self.base, self.folder, [text for text, _ in settings])
+        except InputError as error:
+            self._blame(error.lines, settings, good)
+            return None
+        return values if good else None
+
+    def _blame(self, lines: list[str], settings: list[tuple[str, Key]], complete: bool) -> None:
+        """Say what the program found at the places of the study file that it is about.
+
+        Where not all settings are known, what it says of the rest may come of that.
+        """
+        whose = "with the settings of a run" if len(settings) > 1 else "has a mistake"
+        for line in lines:
+            for text, place in reversed(settings):
+                what = said_of(text, line)
+                if what is not None and place:
+                    self.problems.add(place, what)
+                    break
+            else:
+                if complete:
+                    self.problems.add(("base",), f"the base {whose}: {line}")
 
     def _label(
         self,
@@ -192,7 +213,7 @@ class Planner:
             return None
 
     def _state(
-        self, level: Level, parameters: Mapping[str, Value], namelist: Namelist, label: str
+        self, level: Level, parameters: Mapping[str, Value], values: Values | None, label: str
     ) -> State:
         """Where measures are taken. Those at a strain need a frame there."""
         at = level.at
@@ -201,7 +222,7 @@ class Planner:
         except ExpressionError as error:
             self.problems.add(at("strain"), str(error))
             strain = None
-        frames = namelist.numbers("output", "frame_strains")
+        frames = values.numbers("output", "frame_strains") if values is not None else []
         if strain is not None and not has_frame(frames, strain):
             self.problems.add(
                 at("strain"), f"the run '{label}' has no frame at this strain", strain,
@@ -219,15 +240,17 @@ class Planner:
             self.problems.add(at("line"), str(error))
         return State(strain=strain, line=line)
 
-    def _take_files(self, namelist: Namelist) -> dict[str, Path]:
-        """Files of points go beside the namelist of the run."""
+    def _take_files(self, values: Values) -> dict[str, Path]:
+        """Files of points go beside the input of the run."""
         found: dict[str, Path] = {}
-        for group, name in file_names(namelist):
-            source = next((f / name for f in self.folders if (f / name).is_file()), None)
+        for _, entries in (group for group in values.groups if "file" in group[1]):
+            name = unquoted(entries["file"])
+            folders = (self.base.parent, self.folder)
+            source = next((f / name for f in folders if (f / name).is_file()), None)
             if source is None:
                 self.problems.add(("base",), "the file of points is not there", name)
                 continue
-            group.entries["file"] = [f"'{source.name}'"]
+            entries["file"] = written(source.name)
             found[source.name] = source
         return found
 

@@ -17,6 +17,7 @@ from typing import TextIO
 
 from ..read.errors import RequestError
 from .file import Kinds, Study, load_study
+from .inputs import Inputs
 from .jobs import Job, cores, look, only_one
 from .program import Program, find_program
 from .progress import Progress, duration
@@ -89,11 +90,19 @@ def run_study(
     options = options or StudyOptions()
     stream = stream or sys.stdout
     kinds = kinds or known_kinds()
-    study = load_study(path, kinds)
+
+    def folder_of(name: str) -> Path:
+        return options.output or Path("results") / name
+
+    inputs = Inputs(
+        lambda: find_program(options.program, path), folder_of if options.figures_only else None
+    )
+    study = load_study(path, kinds, inputs)
     chosen = _chosen(study, options.only)
-    program = None if options.figures_only else find_program(options.program, path)
-    folder = options.output or Path("results") / study.name
+    program = None if options.figures_only else inputs.program
+    folder = folder_of(study.name)
     with only_one(folder):
+        inputs.keep(folder)
         return _do(study, kinds, options, chosen, program, folder, stream)
 
 
