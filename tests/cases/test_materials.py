@@ -85,3 +85,16 @@ def test_a_platen_under_a_traction_needs_points_of_one_density(run_case, tmp_pat
     assert run_case(one_density, tmp_path).returncode == 0
     moved = COLUMNS.replace("traction = 0.0, -2.0e4", "velocity = 0.0, -0.01")
     assert run_case(moved, tmp_path, "--force").returncode == 0
+
+
+def test_the_memory_of_a_run_counts_what_the_laws_remember(run_case, tmp_path):
+    def memory(case):
+        """Memory that --check tells [bytes], and points."""
+        done = run_case(case, tmp_path, "--check")
+        assert done.returncode == 0, done.stderr
+        lines = {line[:22].strip(): line[22:].split() for line in done.stdout.splitlines()}
+        return float(lines["memory"][0]) * 1.0e6, int(lines["points"][0].rstrip(","))
+
+    elastic, points = memory(COLUMNS.replace("4000.0", "1000.0"))
+    plastic, _ = memory(COLUMNS.replace("4000.0", "1000.0").replace("'elastic'", "'j2'", 1))
+    assert plastic - elastic == pytest.approx(points * 9 * 8.0, rel=0.02)
