@@ -98,3 +98,19 @@ def test_the_memory_of_a_run_counts_what_the_laws_remember(run_case, tmp_path):
     elastic, points = memory(COLUMNS.replace("4000.0", "1000.0"))
     plastic, _ = memory(COLUMNS.replace("4000.0", "1000.0").replace("'elastic'", "'j2'", 1))
     assert plastic - elastic == pytest.approx(points * 9 * 8.0, rel=0.02)
+
+
+def test_the_statistics_of_a_random_field_are_those_of_each_material(run_case, tmp_path):
+    weak = "model = 'j2', yield_stress = 2.0e4, isotropic_modulus = -1.0e5"
+    weak += ", residual_strength = 1.9e4"
+    case = COLUMNS.replace("4000.0", "1000.0").replace(
+        "name = 'dense', model = 'elastic'", f"name = 'dense', {weak}"
+    )
+    case += "&random_field coefficient_of_variation = 0.2, correlation_length = 0.3 /\n"
+    done = run_case(case, tmp_path, "--check")
+    assert done.returncode == 0, done.stderr
+    told = {line[:22].strip(): line[22:] for line in done.stdout.splitlines()}
+    assert told["yield stress"].startswith("dense: mean ")
+    assert float(told["yield stress"].split()[2]) == pytest.approx(2.0e4, rel=0.25)
+    assert "from 0 to" not in told["yield stress"]
+    assert told["no softening"].startswith("dense: at ")
