@@ -157,8 +157,8 @@ contains
     end do
   end subroutine add_loads
 
-  !> Memory of a run [bytes]: operators; per row the fields of the state, what does not change at the
-  !> points (7 numbers), K^-1 (3), A (4), a field of a frame on its way to the disk (5).
+  !> Memory of a run [bytes]: operators; per row the fields of the state, what does not change at
+  !> the points (7 numbers), K^-1 (3), A (4), a field of a frame on its way to the disk (5).
   real(wp) function memory(model)
     type(model_t), intent(in) :: model
     type(state_t) :: state
