@@ -13,7 +13,7 @@ module pd_run
   use pd_model, only: model_t, release_set_up, start
   use pd_observe, only: column_t, moment_at, observation_t, observe
   use pd_record, only: load_checkpoint, observe_state, open_record, record_frame, record_line, &
-    record_progress, record_row, record_t, results_in_the_way, same_points
+    record_progress, record_row, record_t, results_in_the_way, same_history, same_points
   use pd_run_description, only: provenance_t
   use pd_schedule, only: schedule_t
   use pd_setup, only: set_up_model
@@ -74,6 +74,12 @@ contains
     call set_up_model(run%input, run%model, errors)
     call outcome%end_if_any(errors, exit_model)
     if (outcome%done) return
+    if (run%checkpoint%history_rows > 0) then
+      if (.not. same_history(run%state, run%model)) &
+        call errors%add('the laws remember something else than in the checkpoint', run%input%path)
+      call outcome%end_if_any(errors, exit_file)
+      if (outcome%done) return
+    end if
     run%clock = run%checkpoint%clock
     call set_up_schedule(run%input, run%clock, run%model, run%schedule, errors)
     call outcome%end_if_any(errors, exit_input)

@@ -3,7 +3,7 @@ module pd_summary
   use, intrinsic :: iso_fortran_env, only: int64
   use pd_clock, only: clock_t
   use pd_forces, only: linear_forces
-  use pd_input_types, only: input_t, material_input_t, random_field_input_t
+  use pd_input_types, only: input_t, material_input_t
   use pd_kinds, only: is_set, wp
   use pd_model, only: model_t
   use pd_random_field, only: spread_of, spread_t
@@ -67,7 +67,7 @@ contains
       call summary%add('horizon', number(model%delta)//' m, spacing '// &
         number(model%spacing)//' m: m = '//number(model%delta / model%spacing))
       call summary%add('wave speed', 'c_p = '//number(model%materials%wave_speed())//' m/s')
-      call add_field(input%random_field, input%materials(1), model, summary)
+      call add_field(input, model, summary)
       courant = model%spacing / model%materials%wave_speed()
       text = number(clock%time_step)//' s = '//number(clock%time_step / courant)// &
         ' dx/c_p, rule '//input%integration%time_step_rule
@@ -88,32 +88,55 @@ contains
     end associate
   end function summarise
 
-  !> The random field and its statistics over the body, the weak patch included.
-  subroutine add_field(field, material, model, summary)
-    type(random_field_input_t), intent(in)    :: field
-    type(material_input_t),     intent(in)    :: material
-    type(model_t),              intent(in)    :: model
-    type(summary_t),            intent(inout) :: summary
+  !> The random field, and its statistics in every material that yields.
+  subroutine add_field(input, model, summary)
+    type(input_t),   intent(in)    :: input
+    type(model_t),   intent(in)    :: model
+    type(summary_t), intent(inout) :: summary
+    integer :: k
+
+    associate (field => input%random_field)
+      if (.not. is_set(field%coefficient_of_variation)) return
+      call summary%add('random field', 'coefficient of variation '// &
+        number(field%coefficient_of_variation)//', correlation length '// &
+        number(field%correlation_length)//' m, seed '//whole(field%seed))
+    end associate
+    do k = 1, size(input%materials)
+      if (input%materials(k)%model == 'j2') &
+        call add_strength(k, input%materials(k), size(input%materials) > 1, model, summary)
+    end do
+  end subroutine add_field
+
+  !> Yield stress of a material over the body, the weak patch included.
+  subroutine add_strength(k, material, several, model, summary)
+    integer,                intent(in)    :: k          !! number of the material
+    type(material_input_t), intent(in)    :: material
+    logical,                intent(in)    :: several    !! it is not the only one
+    type(model_t),          intent(in)    :: model
+    type(summary_t),        intent(inout) :: summary
     type(spread_t) :: spread
+    character(:), allocatable :: of_which
+    logical, allocatable :: inside(:)
     integer :: weaker
 
-    if (.not. is_set(field%coefficient_of_variation)) return
-    associate (strength => model%strength(model%operators%storage%row), &
-      inside => model%body%boundary == 0)
-      spread = spread_of(strength, model%points%volume(model%operators%storage%row), inside)
-      weaker = 0
-      if (min(material%kinematic_modulus, material%isotropic_modulus) < 0.0_wp) &
-        weaker = count(inside .and. strength < material%residual_strength)
+    associate (row => model%operators%storage%row, rows => model%operators%n)
+      associate (strength => model%strength(row), here => model%materials%rows_of(k, rows))
+        inside = model%body%boundary == 0 .and. here(row)
+        if (.not. any(inside)) return   ! it is that of no body
+        spread = spread_of(strength, model%points%volume(row), inside)
+        weaker = 0
+        if (min(material%kinematic_modulus, material%isotropic_modulus) < 0.0_wp) &
+          weaker = count(inside .and. strength < material%residual_strength)
+      end associate
     end associate
-    call summary%add('random field', 'coefficient of variation '// &
-      number(field%coefficient_of_variation)//', correlation length '// &
-      number(field%correlation_length)//' m, seed '//whole(field%seed))
-    call summary%add('yield stress', 'mean '//number(spread%mean)//' Pa, coefficient of '// &
-      'variation '//number(spread%variation)//', from '//number(spread%smallest)//' to '// &
-      number(spread%largest)//' Pa')
-    if (weaker > 0) call summary%add('no softening', 'at '//whole(weaker)//' points, which are '// &
-      'weaker than residual_strength')
-  end subroutine add_field
+    of_which = ''
+    if (several) of_which = material%name//': '
+    call summary%add('yield stress', of_which//'mean '//number(spread%mean)// &
+      ' Pa, coefficient of variation '//number(spread%variation)//', from '// &
+      number(spread%smallest)//' to '//number(spread%largest)//' Pa')
+    if (weaker > 0) call summary%add('no softening', of_which//'at '//whole(weaker)// &
+      ' points, which are weaker than residual_strength')
+  end subroutine add_strength
 
   !> Supports under a load, and loads.
   subroutine add_loads(model, summary)
@@ -134,8 +157,8 @@ contains
     end do
   end subroutine add_loads
 
-  !> Memory of a run [bytes]: operators; per row the fields of the state, what does not change at the
-  !> points (7 numbers), K^-1 (3), A (4), a field of a frame on its way to the disk (5).
+  !> Memory of a run [bytes]: operators; per row the fields of the state, what does not change at
+  !> the points (7 numbers), K^-1 (3), A (4), a field of a frame on its way to the disk (5).
   real(wp) function memory(model)
     type(model_t), intent(in) :: model
     type(state_t) :: state

@@ -73,12 +73,16 @@ contains
     if (equals > 0) name = lower_case(trim(adjustl(text(:equals - 1))))
     parts%value = ''
     if (equals > 0) parts%value = trim(adjustl(text(equals + 1:)))
-    if (equals > 0 .and. parts%value == '' .and. name /= '') then
-      if (is_group(name, list)) name = name//'.'
-    end if
     first = index(name, '.')
     last = index(name, '.', back=.true.)
-    if (first < 2 .or. (last == len(name) .and. parts%value /= '')) then
+    if (index(name//'.', '..') > 0) then
+      first = 1   ! nothing beside a dot was to be something: it does not stand for the whole group
+    else if (equals > 0 .and. parts%value == '' .and. is_group(name, list)) then
+      name = name//'.'
+      first = index(name, '.')
+      last = len(name)
+    end if
+    if (first < 2) then
       call errors%add('no key with a value', where=parts%place, &
                       allowed='group.key=value or group.name.key=value')
       return
@@ -241,6 +245,10 @@ contains
     entry = text_entry(parts%key, parts%value, parts%place)
     k = find_key(list%keys, parts%group, parts%key)
     if (k == 0) return   ! check_groups reports it
+    if (scan(parts%value, new_line('a')//achar(13)) > 0) then
+      call errors%add('a value of several lines', where=parts%place, allowed='one line')
+      return
+    end if
     if (list%keys(k)%kind == kind_text .and. verify(parts%value(1:1), '''"') > 0) return
     call scan_namelist(parts%place, '&a b = '//parts%value//' /', scanned, problems)
     if (problems%count() == 0 .and. size(scanned) == 1) then

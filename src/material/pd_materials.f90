@@ -48,6 +48,7 @@ module pd_materials
     procedure :: density_block
     procedure :: wave_speed
     procedure :: density_of
+    procedure :: rows_of
   end type materials_t
 
 contains
@@ -284,5 +285,18 @@ contains
       density(self%runs(k)%lo:self%runs(k)%hi) = self%list(self%runs(k)%material)%density
     end do
   end function density_of
+
+  !> Which of n rows have material k.
+  pure function rows_of(self, k, n) result(rows)
+    class(materials_t), intent(in) :: self
+    integer,            intent(in) :: k, n
+    logical :: rows(n)
+    integer :: r
+
+    rows = .false.
+    do r = 1, size(self%runs)
+      if (self%runs(r)%material == k) rows(self%runs(r)%lo:self%runs(r)%hi) = .true.
+    end do
+  end function rows_of
 
 end module pd_materials

@@ -46,6 +46,8 @@ module pd_checkpoint
   type, extends(field_visitor_t) :: reading_t
     type(hdf5_file_t)  :: file
     type(error_list_t) :: errors
+    integer :: n = 0                    !! points of the checkpoint
+    logical :: fits = .true.            !! all fields so far are of these points
   contains
     procedure :: one_number => read_1
     procedure :: several_numbers => read_2
@@ -219,7 +221,9 @@ contains
     type(state_field_t),   intent(in)    :: about
     real(wp), allocatable, intent(inout) :: values(:)
 
-    if (about%kept) call read_dataset(self%file, place_of(about), values, self%errors)
+    if (.not. about%kept) return
+    call read_dataset(self%file, place_of(about), values, self%errors)
+    self%fits = self%fits .and. size(values) == self%n
   end subroutine read_1
 
   subroutine read_2(self, about, values)
@@ -227,7 +231,11 @@ contains
     type(state_field_t),   intent(in)    :: about
     real(wp), allocatable, intent(inout) :: values(:, :)
 
-    if (about%kept) call read_dataset(self%file, place_of(about), values, self%errors)
+    if (.not. about%kept) return
+    call read_dataset(self%file, place_of(about), values, self%errors)
+    self%fits = self%fits .and. size(values, 1) == self%n
+    ! what the laws remember is not known yet
+    if (about%components /= '') self%fits = self%fits .and. size(values, 2) == about%width()
   end subroutine read_2
 
   subroutine read_whole(path, checkpoint, state, errors)
@@ -247,8 +255,15 @@ contains
     else
       call read_numbers(reader%file, checkpoint, errors)
       reader%errors = errors
+      reader%n = size(checkpoint%volume)
       call state%visit(reader)
       errors = reader%errors
+      associate (position => checkpoint%position)
+        reader%fits = reader%fits .and. size(position, 1) == reader%n &
+          .and. size(position, 2) == 2 .and. size(checkpoint%boundary) == reader%n
+      end associate
+      if (reader%file%is_good() .and. .not. reader%fits) &
+        call errors%add('the fields are not those of its points', where=path)
     end if
     call close_file(reader%file, errors)
   end subroutine read_whole

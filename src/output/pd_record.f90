@@ -28,7 +28,7 @@ module pd_record
 
   public :: record_t, results_in_the_way, open_record, close_record, record_row, record_frame
   public :: record_failure, record_progress, record_line, observe_state
-  public :: save_checkpoint, load_checkpoint, same_points
+  public :: save_checkpoint, load_checkpoint, same_points, same_history
 
   !> The open outputs of a run.
   type :: record_t
@@ -271,7 +271,8 @@ contains
     call read_checkpoint(input%run%output_dir//'/'//input%run%name, checkpoint, state, warning, &
       file_errors)
     if (file_errors%count() > 0) return
-    if (size(checkpoint%ledger) /= size(ledger_names)) then
+    if (size(checkpoint%ledger) /= size(ledger_names) &
+      .or. size(checkpoint%ledger_blocks, 2) /= 3) then
       call file_errors%add('the checkpoint was written by another version of perigeo')
       return
     end if
@@ -295,5 +296,13 @@ contains
       .and. all(abs(checkpoint%volume - body%volume) <= 0.0_wp) &
       .and. all(checkpoint%boundary == body%boundary)
   end function same_points
+
+  !> Whether the points of a state from a checkpoint remember as much as the laws of the model.
+  pure logical function same_history(state, model) result(same)
+    type(state_t), intent(in) :: state
+    type(model_t), intent(in) :: model
+
+    same = size(state%history, 2) == size(model%materials%remembered())
+  end function same_history
 
 end module pd_record

@@ -20,7 +20,7 @@ contains
   !> Operators, materials, supports, loads, damping.
   !>
   !> Errors: points that coincide, families that are too small, no free point, a pressure that acts
-  !> on no point.
+  !> on no point, a platen under a traction with points of different density.
   subroutine set_up_model(input, model, errors)
     type(input_t),      intent(in)    :: input
     type(model_t),      intent(inout) :: model    !! in: with its body
@@ -37,7 +37,7 @@ contains
     call invert_shape_tensors(model%operators, model%points%position, model%points%volume, errors)
     if (errors%count() > 0) return
     call set_up_materials(input, model)
-    call set_up_supports(input, model)
+    call set_up_supports(input, model, errors)
     call set_up_platens(input, model)
     call set_up_loads(input, model, errors)
     call set_up_damping(input, model)

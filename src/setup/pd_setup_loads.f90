@@ -17,6 +17,7 @@ module pd_setup_loads
   use pd_sides, only: normal_axis, side_number
   use pd_supports, only: support_t
   use pd_tables, only: new_table
+  use pd_text, only: number_text
   implicit none
   private
 
@@ -25,20 +26,38 @@ module pd_setup_loads
 contains
 
   !> Supports, and the components that they leave free.
-  subroutine set_up_supports(input, model)
-    type(input_t), intent(in)    :: input
-    type(model_t), intent(inout) :: model
-    real(wp), allocatable :: mass(:)
+  !>
+  !> Errors: a platen under a traction with points of different density.
+  subroutine set_up_supports(input, model, errors)
+    type(input_t),      intent(in)    :: input
+    type(model_t),      intent(inout) :: model
+    type(error_list_t), intent(inout) :: errors
+    real(wp), allocatable :: density(:), mass(:)
     integer :: k, n
 
     n = size(model%points%volume)
-    allocate (mass(n), source=model%materials%density_of(n) * model%points%volume)
+    allocate (density(n), source=model%materials%density_of(n))
+    allocate (mass(n), source=density * model%points%volume)
     allocate (model%supports%items(size(input%boundaries)))
     do k = 1, size(input%boundaries)
       call new_support(input%boundaries, k, mass, model, model%supports%items(k)%support)
+      if (size(input%boundaries(k)%traction) > 0) call check_density(input%boundaries(k)%name, &
+        density(model%supports%items(k)%support%points), errors)
     end do
     call model%supports%mark_prescribed(model%points%free)
   end subroutine set_up_supports
+
+  !> Points under a traction move as one because they all get the same force and damping per volume:
+  !> with different densities they would not.
+  subroutine check_density(name, density, errors)
+    character(*),       intent(in)    :: name
+    real(wp),           intent(in)    :: density(:)   !! of the points of a platen [kg/m^3]
+    type(error_list_t), intent(inout) :: errors
+
+    if (maxval(density) > minval(density)) call errors%add('a platen under a traction holds '// &
+      'points of different density', '&boundary name = '//name, number_text(minval(density))// &
+      ' to '//number_text(maxval(density)), 'one density [kg/m^3], or a prescribed velocity')
+  end subroutine check_density
 
   !> Support number k, of the kind that its boundary describes.
   subroutine new_support(given, k, mass, model, support)

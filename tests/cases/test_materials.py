@@ -56,3 +56,61 @@ def test_stress_is_continuous_across_the_layers_of_a_specimen(run_case, tmp_path
         inside = (height > start) & (height < end)
         strain = np.polyfit(height[inside], displacement[inside], 1)[0]
         assert strain == pytest.approx(-LOAD / constrained_modulus(*layer), rel=0.01)
+
+
+# Two columns side by side under one platen, the right one denser.
+COLUMNS = """
+&run name = 'case', output_dir = 'out', operators = 'list' /
+&discretisation spacing = 0.1, horizon = 0.3, layout = 'cells' /
+&body x_min = 0.0, x_max = 0.5, y_min = 0.0, y_max = 1.0 /
+&body x_min = 0.5, x_max = 1.0, y_min = 0.0, y_max = 1.0, material = 'dense' /
+&material name = 'light', model = 'elastic', density = 1000.0, youngs_modulus = 2.5e7
+  poissons_ratio = 0.2, yield_stress = 1.0e5 /
+&material name = 'dense', model = 'elastic', density = 4000.0, youngs_modulus = 2.5e7
+  poissons_ratio = 0.2 /
+&boundary name = 'bottom', side = 'bottom' /
+&boundary name = 'top', side = 'top', traction = 0.0, -2.0e4 /
+&integration end_time = 0.01, damping = 5.0e5 /
+&output frame_count = 1, history_count = 2 /
+"""
+
+
+def test_a_platen_under_a_traction_needs_points_of_one_density(run_case, tmp_path):
+    # The same force and damping per volume would move points of different density apart.
+    done = run_case(COLUMNS, tmp_path)
+    assert done.returncode == 3
+    assert "&boundary name = top: a platen under a traction" in done.stderr
+    assert "points of different density; found: 1000.0 to 4000.0" in done.stderr
+    one_density = COLUMNS.replace("4000.0", "1000.0")
+    assert run_case(one_density, tmp_path).returncode == 0
+    moved = COLUMNS.replace("traction = 0.0, -2.0e4", "velocity = 0.0, -0.01")
+    assert run_case(moved, tmp_path, "--force").returncode == 0
+
+
+def test_the_memory_of_a_run_counts_what_the_laws_remember(run_case, tmp_path):
+    def memory(case):
+        """Memory that --check tells [bytes], and points."""
+        done = run_case(case, tmp_path, "--check")
+        assert done.returncode == 0, done.stderr
+        lines = {line[:22].strip(): line[22:].split() for line in done.stdout.splitlines()}
+        return float(lines["memory"][0]) * 1.0e6, int(lines["points"][0].rstrip(","))
+
+    elastic, points = memory(COLUMNS.replace("4000.0", "1000.0"))
+    plastic, _ = memory(COLUMNS.replace("4000.0", "1000.0").replace("'elastic'", "'j2'", 1))
+    assert plastic - elastic == pytest.approx(points * 9 * 8.0, rel=0.02)
+
+
+def test_the_statistics_of_a_random_field_are_those_of_each_material(run_case, tmp_path):
+    weak = "model = 'j2', yield_stress = 2.0e4, isotropic_modulus = -1.0e5"
+    weak += ", residual_strength = 1.9e4"
+    case = COLUMNS.replace("4000.0", "1000.0").replace(
+        "name = 'dense', model = 'elastic'", f"name = 'dense', {weak}"
+    )
+    case += "&random_field coefficient_of_variation = 0.2, correlation_length = 0.3 /\n"
+    done = run_case(case, tmp_path, "--check")
+    assert done.returncode == 0, done.stderr
+    told = {line[:22].strip(): line[22:] for line in done.stdout.splitlines()}
+    assert told["yield stress"].startswith("dense: mean ")
+    assert float(told["yield stress"].split()[2]) == pytest.approx(2.0e4, rel=0.25)
+    assert "from 0 to" not in told["yield stress"]
+    assert told["no softening"].startswith("dense: at ")

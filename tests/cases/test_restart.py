@@ -231,3 +231,30 @@ def test_results_of_a_stopped_run_are_not_overwritten_unasked(run_case, copy):
     before = contents(copy / "out")
     assert run_case(LONG, copy).returncode == 5
     assert contents(copy / "out") == before
+
+
+def sealed(path):
+    """Renew the sum over all bytes that a checkpoint begins with."""
+    data = path.read_bytes()
+    body = data[512:] + bytes(-len(data) % 4)
+    simple, weighted, modulus = 1, 0, 2**31 - 1
+    for place in range(0, len(body), 4):
+        simple = (simple + int.from_bytes(body[place : place + 4], "little")) % modulus
+        weighted = (weighted + simple) % modulus
+    total = f"{weighted << 32 | simple:016X}"
+    head = f"perigeo checkpoint{len(data):20d}{total:>20}"
+    path.write_bytes(head.ljust(511).encode() + b"\n" + data[512:])
+
+
+def test_a_checkpoint_of_laws_that_remember_less_is_refused(run_case, tmp_path):
+    text = SPECIMEN.replace("&output", "&output checkpoint_every = 1.0e-6,", 1)
+    assert run_case(text, tmp_path, "--quiet").returncode == 0
+    path = tmp_path / "out" / "case_checkpoint.h5"
+    with h5py.File(path, "r+") as file:
+        history = file["state/history"][()]
+        del file["state/history"]
+        file["state/history"] = history[:, :4]
+    sealed(path)
+    done = run_case(text, tmp_path, "--quiet", "--restart")
+    assert done.returncode == 5
+    assert "the laws remember something else than in the checkpoint" in done.stderr
