@@ -102,7 +102,7 @@ contains
         number(field%correlation_length)//' m, seed '//whole(field%seed))
     end associate
     do k = 1, size(input%materials)
-      if (input%materials(k)%model == 'j2') &
+      if (model%materials%list(k)%law%plastic_strain > 0) &
         call add_strength(k, input%materials(k), size(input%materials) > 1, model, summary)
     end do
   end subroutine add_field
