@@ -260,7 +260,7 @@ contains
     end do
   end subroutine density_block
 
-  !> Largest c_p = sqrt((lambda + 2 G) / rho) of any material [m/s].
+  !> Largest c_p = sqrt((lambda + 2 G) / rho) of any material that the body has [m/s].
   pure real(wp) function wave_speed(self) result(fastest)
     class(materials_t), intent(in) :: self
     real(wp) :: lambda, shear_modulus
@@ -268,6 +268,7 @@ contains
 
     fastest = 0.0_wp
     do k = 1, size(self%list)
+      if (.not. any(self%runs%material == k)) cycle
       call self%list(k)%law%lame_constants(lambda, shear_modulus)
       fastest = max(fastest, sqrt((lambda + 2.0_wp * shear_modulus) / self%list(k)%density))
     end do

@@ -114,3 +114,16 @@ def test_the_statistics_of_a_random_field_are_those_of_each_material(run_case, t
     assert float(told["yield stress"].split()[2]) == pytest.approx(2.0e4, rel=0.25)
     assert "from 0 to" not in told["yield stress"]
     assert told["no softening"].startswith("dense: at ")
+
+
+def test_a_material_that_no_body_has_changes_nothing(run_case, tmp_path):
+    one = COLUMNS.replace("4000.0", "1000.0").replace(", material = 'dense'", "")
+    one = one.replace("damping", "time_step_rule = 'courant', safety = 0.5, damping")
+    stiff = one.replace(
+        "density = 1000.0, youngs_modulus = 2.5e7\n  poissons_ratio = 0.2 /",
+        "density = 1000.0, youngs_modulus = 9.9e9\n  poissons_ratio = 0.2 /",
+    )
+    assert stiff != one
+    told = [run_case(case, tmp_path, "--check").stdout.splitlines() for case in (one, stiff)]
+    assert len(told[0]) > 10
+    assert told[0][:-1] == told[1][:-1]
