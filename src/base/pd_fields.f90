@@ -1,8 +1,8 @@
 !> Visitors of fields over the points: a state names its fields once, in one procedure that shows
 !> them to a visitor; everything that is done with all fields is a visitor.
 !>
-!> The visitors here need nothing but arrays: they allocate, gather some rows, scatter them over
-!> more rows, and count. Those that read and write are in `pd_checkpoint`.
+!> The visitors here need nothing but arrays: they allocate, scatter some rows over more rows,
+!> and count. Those that read and write are in `pd_checkpoint`.
 module pd_fields
   use pd_kinds, only: wp
   use pd_labels, only: field_label_t, label_t
@@ -10,7 +10,7 @@ module pd_fields
   private
 
   public :: field_visitor_t, state_field_t
-  public :: allocating_t, gathering_t, scattering_t, counting_t
+  public :: allocating_t, scattering_t, counting_t
 
   !> A field of a state: named components, or columns that each have a name, a unit and a sentence
   !> of their own (what a law remembers).
@@ -56,15 +56,6 @@ module pd_fields
     procedure :: one_number => allocate_1
     procedure :: several_numbers => allocate_2
   end type allocating_t
-
-  !> Of the fields that are kept, take the values of some rows only, in their order; deallocate the
-  !> others.
-  type, extends(field_visitor_t) :: gathering_t
-    integer, allocatable :: rows(:)
-  contains
-    procedure :: one_number => gather_1
-    procedure :: several_numbers => gather_2
-  end type gathering_t
 
   !> Put the values of the fields that are kept into some of n rows; all other values are those of
   !> an unloaded point.
@@ -127,27 +118,6 @@ contains
       values(:, k) = about%unloaded(k)
     end do
   end subroutine allocate_2
-
-  subroutine gather_1(self, about, values)
-    class(gathering_t),    intent(inout) :: self
-    type(state_field_t),   intent(in)    :: about
-    real(wp), allocatable, intent(inout) :: values(:)
-    real(wp), allocatable :: chosen(:)
-
-    if (about%kept) allocate (chosen(size(self%rows)), source=values(self%rows))
-    call move_alloc(chosen, values)
-  end subroutine gather_1
-
-  subroutine gather_2(self, about, values)
-    class(gathering_t),    intent(inout) :: self
-    type(state_field_t),   intent(in)    :: about
-    real(wp), allocatable, intent(inout) :: values(:, :)
-    real(wp), allocatable :: chosen(:, :)
-
-    if (about%kept) allocate (chosen(size(self%rows), about%width()), &
-      source=values(self%rows, :))
-    call move_alloc(chosen, values)
-  end subroutine gather_2
 
   subroutine scatter_1(self, about, values)
     class(scattering_t),   intent(inout) :: self

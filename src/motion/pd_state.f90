@@ -3,8 +3,7 @@
 !> `visit` is the table of its fields: everything that is done with all of them is a visitor.
 module pd_state
   use pd_blocks, only: blocks_t
-  use pd_fields, only: allocating_t, counting_t, field_visitor_t, gathering_t, scattering_t, &
-    state_field_t
+  use pd_fields, only: allocating_t, counting_t, field_visitor_t, scattering_t, state_field_t
   use pd_kinds, only: wp
   use pd_labels, only: label_t
   use pd_law, only: law_points_t
@@ -24,7 +23,6 @@ module pd_state
   contains
     procedure :: visit
     procedure :: allocate => allocate_state
-    procedure :: gather
     procedure :: scatter
     procedure :: numbers_per_point
   end type state_t
@@ -88,16 +86,6 @@ contains
     room%n = n
     call self%visit(room)
   end subroutine allocate_state
-
-  !> Reduce the fields that a restart needs to some rows, in their order; deallocate the others.
-  subroutine gather(self, rows)
-    class(state_t), intent(inout) :: self
-    integer,        intent(in)    :: rows(:)
-    type(gathering_t) :: choice
-
-    allocate (choice%rows, source=rows)
-    call self%visit(choice)
-  end subroutine gather
 
   !> The state of n rows from that of some of them; the others are unloaded and at rest.
   subroutine scatter(self, rows, n)

@@ -38,6 +38,7 @@ module pd_checkpoint
   type, extends(field_visitor_t) :: writing_t
     type(hdf5_file_t)  :: file
     type(error_list_t) :: errors
+    integer, allocatable :: rows(:)     !! of the points, in their order
   contains
     procedure :: one_number => write_1
     procedure :: several_numbers => write_2
@@ -83,10 +84,11 @@ contains
   !> Write a checkpoint; the newest so far becomes the previous one.
   !>
   !> Errors: it cannot be written; the checkpoints so far are then as they were.
-  subroutine write_checkpoint(stem, checkpoint, state, errors)
+  subroutine write_checkpoint(stem, checkpoint, state, rows, errors)
     character(*),       intent(in)    :: stem   !! output folder and name of the run
     type(checkpoint_t), intent(in)    :: checkpoint
     class(state_t),     intent(inout) :: state   !! visited, not changed
+    integer,            intent(in)    :: rows(:) !! of the state that belong to points, in order
     type(error_list_t), intent(inout) :: errors
     character(:), allocatable :: temporary
     type(writing_t) :: writer
@@ -99,6 +101,7 @@ contains
     call write_numbers(writer%file, checkpoint, errors)
     call create_group(writer%file, '/state', errors)
     writer%errors = errors
+    writer%rows = rows
     call state%visit(writer)
     errors = writer%errors
     call close_file(writer%file, errors)
@@ -170,7 +173,7 @@ contains
     real(wp), allocatable, intent(inout) :: values(:)
 
     if (.not. about%kept) return
-    call write_dataset(self%file, place_of(about), values, self%errors)
+    call write_dataset(self%file, place_of(about), values(self%rows), self%errors)
     call describe(self%file, about, self%errors)
   end subroutine write_1
 
@@ -180,7 +183,7 @@ contains
     real(wp), allocatable, intent(inout) :: values(:, :)
 
     if (.not. about%kept) return
-    call write_dataset(self%file, place_of(about), values, self%errors)
+    call write_dataset(self%file, place_of(about), values(self%rows, :), self%errors)
     call describe(self%file, about, self%errors)
   end subroutine write_2
 

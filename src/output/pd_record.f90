@@ -226,13 +226,12 @@ contains
   !> Write a checkpoint of the state after a step, but first the rows of the history before it.
   subroutine save_checkpoint(model, state, ledger, clock, record, errors)
     type(model_t),      intent(in)    :: model
-    type(state_t),      intent(in)    :: state
+    type(state_t),      intent(inout) :: state   !! visited, not changed
     type(ledger_t),     intent(in)    :: ledger
     type(clock_t),      intent(in)    :: clock
     type(record_t),     intent(inout) :: record
     type(error_list_t), intent(inout) :: errors
     type(checkpoint_t) :: checkpoint
-    type(state_t)      :: kept
     integer :: before
 
     before = errors%count()
@@ -251,9 +250,7 @@ contains
     checkpoint%position = model%points%position(model%operators%storage%row, :)
     checkpoint%volume = model%points%volume(model%operators%storage%row)
     checkpoint%boundary = model%body%boundary
-    kept = state
-    call kept%gather(model%operators%storage%row)
-    call write_checkpoint(record%stem, checkpoint, kept, errors)
+    call write_checkpoint(record%stem, checkpoint, state, model%operators%storage%row, errors)
   end subroutine save_checkpoint
 
   !> Read the newest checkpoint and compare its input with the present one. The state has one row
