@@ -6,6 +6,7 @@
 module pd_affine_support
   use pd_kinds, only: wp
   use pd_point_sets, only: point_set_t
+  use pd_ranks, only: ranks_t
   use pd_supports, only: reaction, support_t
   use pd_tables, only: table_t
   implicit none
@@ -77,17 +78,15 @@ contains
   pure subroutine take_reactions(self, volume, t, f)
     class(affine_support_t), intent(inout) :: self
     real(wp),                intent(in)    :: volume(:), t, f(:, :)
-    integer :: k, p
+    type(ranks_t) :: ranks
 
     associate (unused => t)
     end associate
     self%mode_force_before = self%mode_force
-    self%mode_force = 0.0_wp
     self%force = reaction(self%points, volume, f)
-    do k = 1, size(self%points)
-      p = self%points(k)
-      self%mode_force = self%mode_force - volume(p) * sum(f(p, :) * self%mode(:, k))
-    end do
+    associate (p => self%points, m => self%mode)
+      self%mode_force = -ranks%total(volume(p) * (f(p, 1) * m(1, :) + f(p, 2) * m(2, :)))
+    end associate
   end subroutine take_reactions
 
   pure real(wp) function work(self, v, t, t_next)

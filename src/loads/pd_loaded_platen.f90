@@ -10,6 +10,7 @@
 module pd_loaded_platen
   use pd_kinds, only: wp
   use pd_point_sets, only: point_set_t
+  use pd_ranks, only: ranks_t
   use pd_supports, only: reaction, support_t
   use pd_tables, only: new_ramp, table_t
   use pd_text, only: short_number
@@ -92,18 +93,9 @@ contains
     real(wp), intent(in)    :: force       !! on all of the points [N/m]
     real(wp), intent(in)    :: volume(:)   !! V (n) [m^2]
     real(wp), intent(inout) :: f(:)        !! one component (n) [N/m^3]
-    real(wp) :: total, area
-    integer  :: k
+    type(ranks_t) :: ranks
 
-    total = force
-    area = 0.0_wp
-    do k = 1, size(points)
-      total = total + volume(points(k)) * f(points(k))
-      area = area + volume(points(k))
-    end do
-    do k = 1, size(points)
-      f(points(k)) = total / area
-    end do
+    f(points) = (force + ranks%total(volume(points) * f(points))) / ranks%total(volume(points))
   end subroutine share
 
   !> - sum V f of the internal forces: f contains the applied force as well.

@@ -9,6 +9,7 @@ module pd_pressure
   use pd_loads, only: load_t
   use pd_operators, only: operators_t
   use pd_point_sets, only: side_t
+  use pd_ranks, only: ranks_t
   use pd_tables, only: new_ramp, table_t
   use pd_text, only: integer_text, short_number
   implicit none
@@ -186,12 +187,9 @@ contains
     class(pressure_t), intent(in) :: self
     real(wp),          intent(in) :: v(:, :), t, t_next
     real(wp) :: power
-    integer  :: k
+    type(ranks_t) :: ranks
 
-    power = 0.0_wp
-    do k = 1, size(self%points)
-      power = power + self%force(k) * v(self%points(k), self%axis)
-    end do
+    power = ranks%total(self%force * v(self%points, self%axis))
     work = (t_next - t) * (0.5_wp * (self%factor%rate(t) + self%factor%rate(t_next))) * power
   end function work
 

@@ -5,6 +5,7 @@
 !> Source: doc/theory.md, section 7.
 module pd_supports
   use pd_kinds, only: wp
+  use pd_ranks, only: ranks_t
   use pd_tables, only: table_t
   implicit none
   private
@@ -90,12 +91,10 @@ contains
     real(wp), intent(in) :: volume(:)                 !! V (n) [m^2]
     real(wp), intent(in) :: f(:, :)                   !! (n,2) [N/m^3]
     real(wp) :: force(2)
-    integer  :: k
+    type(ranks_t) :: ranks
 
-    force = 0.0_wp
-    do k = 1, size(points)
-      force = force - volume(points(k)) * f(points(k), :)
-    end do
+    force(1) = -ranks%total(volume(points) * f(points, 1))
+    force(2) = -ranks%total(volume(points) * f(points, 2))
   end function reaction
 
   ! --- defaults, right for most supports
