@@ -53,6 +53,7 @@ contains
     type(run_t),     intent(inout) :: run
     type(outcome_t), intent(inout) :: outcome
     type(error_list_t) :: errors, input_errors
+    integer :: k
 
     call read_input(options%input_path, run%input, errors, options%settings)
     call outcome%end_if_any(errors, exit_input)
@@ -67,16 +68,24 @@ contains
     if (outcome%done) return
     if (run%checkpoint%history_rows > 0) then
       if (.not. same_points(run%checkpoint, run%model%body)) &
-        call errors%add('the points are not those of the checkpoint', run%input%path)
+        call errors%add('the points are not those of the checkpoint', run%input%path, &
+        allowed='the same body and file of points, or --force for a new run')
       call outcome%end_if_any(errors, exit_input)
       if (outcome%done) return
     end if
     call set_up_model(run%input, run%model, errors)
     call outcome%end_if_any(errors, exit_model)
     if (outcome%done) return
+    do k = 1, size(run%model%materials%list)
+      associate (materials => run%model%materials)
+        if (.not. materials%is_used(k)) call run%warnings%add('no point has the material '''// &
+          materials%list(k)%name//'''; &body material chooses one', run%input%path)
+      end associate
+    end do
     if (run%checkpoint%history_rows > 0) then
       if (.not. same_history(run%state, run%model)) &
-        call errors%add('the laws remember something else than in the checkpoint', run%input%path)
+        call errors%add('the laws remember something else than in the checkpoint', run%input%path, &
+        allowed='the version of perigeo that wrote it, or --force for a new run')
       call outcome%end_if_any(errors, exit_file)
       if (outcome%done) return
     end if

@@ -84,7 +84,7 @@ contains
       call add_loads(model, summary)
       call summary%add('frames', whole(size(schedule%frame_steps))// &
         ' and the unloaded state; history rows '//whole(schedule%rows))
-      call summary%add('memory', number(memory(model) / 1.0e6_wp)//' MB')
+      call summary%add('memory', number(memory(input, model) / 1.0e6_wp)//' MB')
     end associate
   end function summarise
 
@@ -158,14 +158,18 @@ contains
   end subroutine add_loads
 
   !> Memory of a run [bytes]: operators; per row the fields of the state, what does not change at
-  !> the points (7 numbers), K^-1 (3), A (4), a field of a frame on its way to the disk (5).
-  real(wp) function memory(model)
+  !> the points (7 numbers), K^-1 (3), A (4), a field of a frame on its way to the disk (5), the
+  !> points and a field of a checkpoint likewise (15).
+  real(wp) function memory(input, model)
+    type(input_t), intent(in) :: input
     type(model_t), intent(in) :: model
     type(state_t) :: state
+    integer :: numbers
 
     state%remembered = model%materials%remembered()
-    memory = model%operators%memory() + real(model%operators%n, wp) * 8.0_wp &
-      * real(state%numbers_per_point() + 7 + 3 + 4 + 5, wp)
+    numbers = state%numbers_per_point() + 7 + 3 + 4 + 5
+    if (input%output%checkpoint_every > 0.0_wp) numbers = numbers + 15
+    memory = model%operators%memory() + real(model%operators%n, wp) * 8.0_wp * real(numbers, wp)
   end function memory
 
   !> Estimated wall clock time of the run [s], from the fastest of a few applications of the linear

@@ -118,9 +118,12 @@ contains
     type(namelist_group_t), allocatable, intent(inout) :: groups(:)
     integer,                             intent(out)   :: i
     type(error_list_t),                  intent(inout) :: errors
+    character(:), allocatable :: key
     integer :: known, n
 
     i = 0
+    key = parts%key
+    if (find_key(list%keys, parts%group, key) == 0) key = 'key'   ! boundary.top=5 lacks one
     known = find_group(list%groups, parts%group)
     if (known == 0) then
       call errors%add('unknown group'//did_you_mean(parts%group, list%groups%name), &
@@ -145,7 +148,7 @@ contains
     else if (n > 1) then
       call errors%add('the file has several groups of this name', where=parts%place, &
         found=integer_text(n)//' groups &'//parts%group, &
-        allowed=parts%group//'.name.'//parts%key//' or '//parts%group//'.number.'//parts%key)
+        allowed=parts%group//'.name.'//key//' or '//parts%group//'.number.'//key)
     else if (list%groups(known)%repeats .or. parts%key == '') then
       call errors%add('the file has no group &'//parts%group, where=parts%place)
     else

@@ -46,6 +46,7 @@ module pd_materials
     procedure :: energy_block
     procedure :: plastic_strain_block
     procedure :: density_block
+    procedure :: is_used
     procedure :: wave_speed
     procedure :: density_of
     procedure :: rows_of
@@ -260,6 +261,14 @@ contains
     end do
   end subroutine density_block
 
+  !> Whether the body has material k anywhere.
+  pure logical function is_used(self, k)
+    class(materials_t), intent(in) :: self
+    integer,            intent(in) :: k
+
+    is_used = any(self%runs%material == k)
+  end function is_used
+
   !> Largest c_p = sqrt((lambda + 2 G) / rho) of any material that the body has [m/s].
   pure real(wp) function wave_speed(self) result(fastest)
     class(materials_t), intent(in) :: self
@@ -268,7 +277,7 @@ contains
 
     fastest = 0.0_wp
     do k = 1, size(self%list)
-      if (.not. any(self%runs%material == k)) cycle
+      if (.not. self%is_used(k)) cycle
       call self%list(k)%law%lame_constants(lambda, shear_modulus)
       fastest = max(fastest, sqrt((lambda + 2.0_wp * shear_modulus) / self%list(k)%density))
     end do

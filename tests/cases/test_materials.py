@@ -87,6 +87,13 @@ def test_a_platen_under_a_traction_needs_points_of_one_density(run_case, tmp_pat
     assert run_case(moved, tmp_path, "--force").returncode == 0
 
 
+def test_a_material_that_no_point_has_is_told(run_case, tmp_path):
+    done = run_case(COLUMNS.replace(", material = 'dense'", ""), tmp_path, "--check")
+    assert done.returncode == 0
+    assert "no point has the material 'dense'; &body material chooses one" in done.stdout
+    assert "no point has" not in run_case(COLUMNS, tmp_path, "--check").stdout
+
+
 def test_the_memory_of_a_run_counts_what_the_laws_remember(run_case, tmp_path):
     def memory(case):
         """Memory that --check tells [bytes], and points."""

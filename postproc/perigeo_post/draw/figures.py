@@ -164,11 +164,12 @@ def draw_profile(ax: Axes, measure: BandMeasure) -> None:
     (x0, y0), (x1, y1) = profile.line
     ax.set_xlabel(
         "Distance along the line [m]\n"
-        f"from ({x0 + 0.0:.3f}, {y0 + 0.0:.3f}) m to ({x1 + 0.0:.3f}, {y1 + 0.0:.3f}) m"
+        f"from ({x0 + 0.0:.3f}, {y0 + 0.0:.3f}) m\nto ({x1 + 0.0:.3f}, {y1 + 0.0:.3f}) m"
     )
     ax.set_ylabel(with_unit(label_of(profile.name), profile.unit))
     ax.set_xlim(0.0, float(profile.distance[-1]))
-    ax.set_ylim(bottom=0.0)
+    highest = np.nanmax(profile.values)
+    ax.set_ylim(0.0, 1.3 * highest if highest > 0.0 else None)  # room for the text above the peak
 
 
 def band_figure(run: Run, measure: BandMeasure) -> Figure:
@@ -196,7 +197,7 @@ def band_figure(run: Run, measure: BandMeasure) -> Figure:
         draw_profile(right, measure)
         strong = measure.bands.prevailing
         right.set_title(
-            f"Prevailing band {strong.angle:.1f}° ± {strong.angle_uncertainty:.1f}° to the "
+            f"Prevailing band\n{strong.angle:.1f}° ± {strong.angle_uncertainty:.1f}° to the "
             f"loading axis\nweaker over stronger band {measure.bands.ratio:.2f}"
         )
     return figure
