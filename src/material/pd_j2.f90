@@ -273,7 +273,7 @@ contains
     if (n > 0) then
       call gather_points(n, first, flow%rows, trial, points, yielding)
       call return_to_surface(self, n, yielding)
-      call scatter_points(n, first, flow%rows, yielding, trial, points, flow%dissipated)
+      call scatter_points(n, first, yielding, trial, points, flow)
     end if
     points%stress(lo:hi, :) = trial(lo - first + 1:hi - first + 1, :)
   end subroutine stress_block

@@ -104,29 +104,27 @@ contains
 
   !> From H to the first Piola stress of a block: strain, law, and the stress conjugate to it. The
   !> history goes from step n to n+1.
-  !>
-  !> `dissipated`: work of the stress on the plastic strain [J/m].
-  pure subroutine stress_block(self, block, volume, h, points, p, dissipated)
+  pure subroutine stress_block(self, block, h, points, p, flow)
     class(materials_t), intent(in) :: self
     integer,  intent(in) :: block
-    real(wp), intent(in), contiguous :: volume(:)   !! V (n) [m^2]
     real(wp), intent(in), contiguous :: h(:, :)     !! H (n,4) xx xy yx yy
     type(law_points_t), intent(inout) :: points
     real(wp), intent(inout) :: p(n_block, 4)        !! out: P xx xy yx yy [Pa]; holds the strain
                                                     !! first, to save room in the cache
-    real(wp), intent(out)   :: dissipated
-    type(flow_t) :: flow
-    integer      :: first, i, k
+    type(flow_t), intent(inout) :: flow             !! out: of all rows of the block
+    type(flow_t) :: part
+    integer      :: first, k
 
-    dissipated = 0.0_wp
     first = self%runs(self%first_run(block))%lo
     do k = self%first_run(block), self%first_run(block + 1) - 1
       associate (run => self%runs(k), material => self%list(self%runs(k)%material))
         call material%measure%strain_block(first, run%lo, run%hi, h, p)
-        call material%law%stress_block(first, run%lo, run%hi, p, points, flow)
-        do i = 1, flow%n
-          dissipated = dissipated + volume(flow%rows(i)) * flow%dissipated(i)
-        end do
+        if (k == self%first_run(block)) then
+          call material%law%stress_block(first, run%lo, run%hi, p, points, flow)
+        else
+          call material%law%stress_block(first, run%lo, run%hi, p, points, part)
+          call flow%append(part)
+        end if
         call material%measure%first_piola_block(first, run%lo, run%hi, h, points%stress, p)
       end associate
     end do

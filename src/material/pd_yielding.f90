@@ -4,7 +4,8 @@
 module pd_yielding
   use pd_kinds, only: n_block, wp
   use pd_labels, only: label_t
-  use pd_law, only: law_points_t
+  use pd_law, only: flow_t, law_points_t
+  use pd_tensors, only: von_mises
   implicit none
   private
 
@@ -64,22 +65,23 @@ contains
     end associate
   end subroutine gather_points
 
-  !> Put the returned points back into their rows, and add up what they dissipated.
-  pure subroutine scatter_points(n, first, rows, yielding, trial, points, dissipated)
-    integer,            intent(in)    :: n, first, rows(n_block)
+  !> Put the returned points back into their rows, and tell how they flowed: what they dissipated,
+  !> how far they flowed, and sqrt(3/2)|dev S| at the end.
+  pure subroutine scatter_points(n, first, yielding, trial, points, flow)
+    integer,            intent(in)    :: n, first
     type(yielding_t),   intent(in)    :: yielding
     real(wp),           intent(inout) :: trial(n_block, 4)
     type(law_points_t), intent(inout) :: points
-    real(wp),           intent(inout) :: dissipated(n_block)   !! out: (n) [J/m^3]
+    type(flow_t),       intent(inout) :: flow   !! its rows are given
     real(wp), parameter :: twice(4) = [1.0_wp, 1.0_wp, 1.0_wp, 2.0_wp]
     integer :: i, k, c
 
-    dissipated(:n) = 0.0_wp
-    associate (history => points%history)
+    flow%dissipated(:n) = 0.0_wp
+    associate (history => points%history, rows => flow%rows)
       do c = 1, 4
         do k = 1, n
           i = rows(k)
-          dissipated(k) = dissipated(k) + 0.5_wp * twice(c) &
+          flow%dissipated(k) = flow%dissipated(k) + 0.5_wp * twice(c) &
             * (points%stress(i, c) + yielding%stress(k, c)) &
             * (yielding%plastic_strain(k, c) - history(i, plastic_strain + c))
           trial(i - first + 1, c) = yielding%stress(k, c)
@@ -88,6 +90,8 @@ contains
         end do
       end do
       do k = 1, n
+        flow%increment(k) = yielding%alpha(k) - history(rows(k), alpha)
+        flow%strength(k) = von_mises(yielding%stress(k, :))
         history(rows(k), alpha) = yielding%alpha(k)
       end do
     end associate

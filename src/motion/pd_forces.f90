@@ -6,6 +6,7 @@
 !> Source: doc/theory.md, sections 2 to 5 and 7.
 module pd_forces
   use pd_kinds, only: n_block, wp
+  use pd_law, only: flow_t
   use pd_materials, only: materials_t
   use pd_model, only: model_t
   use pd_operators, only: operators_t
@@ -83,6 +84,7 @@ contains
     type(state_t),      intent(inout) :: state
     type(block_work_t), intent(inout) :: work
     logical,            intent(in)    :: timed
+    type(flow_t) :: flow
     real(wp) :: p(n_block, 4)
     integer  :: lo, hi
 
@@ -94,8 +96,8 @@ contains
     if (timed) work%times(2, block) = now()
     work%failed(block) = first_inverted(lo, hi, state%displacement_gradient)
     if (work%failed(block) == 0) then
-      call materials%stress_block(block, volume, state%displacement_gradient, state%law_points_t, &
-        p, work%dissipated(block))
+      call materials%stress_block(block, state%displacement_gradient, state%law_points_t, p, flow)
+      work%dissipated(block) = flow%work(volume)
       call operators%hand_over_block(lo, hi, state%displacement_gradient, p)
     end if
     if (timed) work%times(3, block) = now()

@@ -59,6 +59,8 @@ contains
         damage(i) = 1.0_wp - self%threshold / kappa
         points%stress(i, :) = (1.0_wp - damage(i)) * whole(b, :)
         flow%rows(i - lo + 1) = i
+        flow%increment(i - lo + 1) = 0.0_wp
+        flow%strength(i - lo + 1) = self%shear_modulus * self%threshold
         flow%dissipated(i - lo + 1) = 0.5_wp * self%shear_modulus * self%threshold &
           * (kappa - before)
       end do
