@@ -53,7 +53,7 @@ contains
     call visitor%text_key(key_t('model', required=.true., choices='elastic j2', &
       meaning='elastic, or von Mises plasticity with hardening or softening'), self%model)
     call visitor%text_key(key_t('strain_measure', default='green_lagrange', &
-      choices='green_lagrange', meaning='strain in which the law is written'), &
+      choices='green_lagrange logarithmic small', meaning='strain in which the law is written'), &
       self%strain_measure)
     call visitor%real_key(key_t('density', unit='kg/m^3', required=.true., range=positive, &
       meaning='mass per volume'), self%density)

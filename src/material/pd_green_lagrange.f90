@@ -4,9 +4,8 @@
 !>
 !> Source: doc/theory.md, section 2.
 module pd_green_lagrange
-  use pd_kinds, only: wp
-  use pd_measure, only: measure_t
-  use pd_tensors, only: determinant
+  use pd_kinds, only: n_block, wp
+  use pd_measure, only: cauchy_stress, measure_t, n_kept
   implicit none
   private
 
@@ -22,10 +21,11 @@ module pd_green_lagrange
 contains
 
   !> E of rows lo to hi.
-  pure subroutine strain_block(first, lo, hi, h, e)
+  pure subroutine strain_block(first, lo, hi, h, e, kept)
     integer,  intent(in) :: first, lo, hi
     real(wp), intent(in),    contiguous :: h(:, :)   !! H (n,4) xx xy yx yy
     real(wp), intent(inout), contiguous :: e(:, :)   !! out: E xx yy zz xy; row 1 is row `first`
+    real(wp), intent(inout) :: kept(n_block, n_kept) !! nothing
     integer :: i, b
 
     !$omp simd simdlen(8) private(b)
@@ -36,13 +36,16 @@ contains
       e(b, 3) = 0.0_wp
       e(b, 4) = 0.5_wp * (h(i, 2) + h(i, 3) + h(i, 1) * h(i, 2) + h(i, 3) * h(i, 4))
     end do
+    associate (unused => kept)
+    end associate
   end subroutine strain_block
 
   !> P = S + H S of rows lo to hi.
-  pure subroutine first_piola_block(first, lo, hi, h, s, p)
+  pure subroutine first_piola_block(first, lo, hi, h, s, kept, p)
     integer,  intent(in) :: first, lo, hi
     real(wp), intent(in),    contiguous :: h(:, :)   !! H (n,4) xx xy yx yy
     real(wp), intent(in),    contiguous :: s(:, :)   !! S (n,4) xx yy zz xy [Pa]
+    real(wp), intent(in)    :: kept(n_block, n_kept) !! nothing
     real(wp), intent(inout), contiguous :: p(:, :)   !! out: P xx xy yx yy; row 1 is row `first`
     real(wp) :: fxx, fyy
     integer  :: i, b
@@ -57,6 +60,8 @@ contains
       p(b, 3) = h(i, 3) * s(i, 1) + fyy * s(i, 4)
       p(b, 4) = h(i, 3) * s(i, 4) + fyy * s(i, 2)
     end do
+    associate (unused => kept)
+    end associate
   end subroutine first_piola_block
 
   !> Cauchy stress P F^T / det F.
@@ -64,14 +69,10 @@ contains
     real(wp), intent(in) :: h(4)   !! H xx xy yx yy
     real(wp), intent(in) :: s(4)   !! S xx yy zz xy [Pa]
     real(wp) :: sigma(4)           !! xx yy zz xy [Pa]
-    real(wp) :: p(1, 4), j
+    real(wp) :: p(1, 4), kept(n_block, n_kept)
 
-    call first_piola_block(1, 1, 1, reshape(h, [1, 4]), reshape(s, [1, 4]), p)
-    j = determinant(h)
-    sigma(1) = (p(1, 1) * (1.0_wp + h(1)) + p(1, 2) * h(2)) / j
-    sigma(2) = (p(1, 3) * h(3) + p(1, 4) * (1.0_wp + h(4))) / j
-    sigma(3) = s(3) / j
-    sigma(4) = (p(1, 1) * h(3) + p(1, 2) * (1.0_wp + h(4))) / j
+    call first_piola_block(1, 1, 1, reshape(h, [1, 4]), reshape(s, [1, 4]), kept, p)
+    sigma = cauchy_stress(h, p(1, :), s(3))
   end function cauchy
 
 end module pd_green_lagrange

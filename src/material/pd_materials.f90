@@ -10,7 +10,7 @@ module pd_materials
   use pd_kinds, only: n_block, wp
   use pd_labels, only: label_t
   use pd_law, only: flow_t, law_points_t, law_t
-  use pd_measure, only: measure_t, small_strain_block
+  use pd_measure, only: measure_t, n_kept, small_strain_block
   use pd_tensors, only: determinant
   implicit none
   private
@@ -113,19 +113,21 @@ contains
                                                     !! first, to save room in the cache
     type(flow_t), intent(inout) :: flow             !! out: of all rows of the block
     type(flow_t) :: part
+    real(wp)     :: kept(n_block, n_kept)
     integer      :: first, k
 
     first = self%runs(self%first_run(block))%lo
     do k = self%first_run(block), self%first_run(block + 1) - 1
       associate (run => self%runs(k), material => self%list(self%runs(k)%material))
-        call material%measure%strain_block(first, run%lo, run%hi, h, p)
+        call material%measure%strain_block(first, run%lo, run%hi, h, p, kept)
         if (k == self%first_run(block)) then
           call material%law%stress_block(first, run%lo, run%hi, p, points, flow)
         else
           call material%law%stress_block(first, run%lo, run%hi, p, points, part)
           call flow%append(part)
         end if
-        call material%measure%first_piola_block(first, run%lo, run%hi, h, points%stress, p)
+        call material%measure%first_piola_block(first, run%lo, run%hi, h, points%stress, kept, &
+          p)
       end associate
     end do
   end subroutine stress_block
@@ -177,12 +179,13 @@ contains
     integer,  intent(in) :: block
     real(wp), intent(in), contiguous :: h(:, :)   !! H (n,4) xx xy yx yy
     real(wp), intent(inout) :: strain(n_block, 4) !! out: E xx yy zz xy
-    integer :: first, k
+    real(wp) :: kept(n_block, n_kept)
+    integer  :: first, k
 
     first = self%runs(self%first_run(block))%lo
     do k = self%first_run(block), self%first_run(block + 1) - 1
       associate (run => self%runs(k))
-        call self%list(run%material)%measure%strain_block(first, run%lo, run%hi, h, strain)
+        call self%list(run%material)%measure%strain_block(first, run%lo, run%hi, h, strain, kept)
       end associate
     end do
   end subroutine strain_block
@@ -194,12 +197,14 @@ contains
     real(wp), intent(in), contiguous :: h(:, :)        !! H (n,4) xx xy yx yy
     real(wp), intent(in), contiguous :: stress(:, :)   !! conjugate stress (n,4) xx yy zz xy [Pa]
     real(wp), intent(inout) :: p(n_block, 4)           !! out: P xx xy yx yy [Pa]
-    integer :: first, k
+    real(wp) :: kept(n_block, n_kept)
+    integer  :: first, k
 
     first = self%runs(self%first_run(block))%lo
     do k = self%first_run(block), self%first_run(block + 1) - 1
-      associate (run => self%runs(k))
-        call self%list(run%material)%measure%first_piola_block(first, run%lo, run%hi, h, stress, p)
+      associate (run => self%runs(k), measure => self%list(self%runs(k)%material)%measure)
+        call measure%strain_block(first, run%lo, run%hi, h, p, kept)
+        call measure%first_piola_block(first, run%lo, run%hi, h, stress, kept, p)
       end associate
     end do
   end subroutine first_piola_block

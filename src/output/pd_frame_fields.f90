@@ -8,7 +8,7 @@ module pd_frame_fields
   use pd_labels, only: field_label_t
   use pd_model, only: model_t
   use pd_state, only: state_t
-  use pd_tensors, only: von_mises
+  use pd_tensors, only: determinant, von_mises
   implicit none
   private
 
@@ -60,6 +60,7 @@ contains
       'component)', tensor, strain), &
       frame_field_t('plastic_strain', '1', 'equivalent plastic strain alpha', '', &
       plastic_strain), &
+      frame_field_t('det_f', '1', 'det F, volume over that of the undeformed body', '', det_f), &
       frame_field_t('von_mises', 'Pa', 'equivalent stress sqrt(3/2) |deviator of the Cauchy '// &
       'stress|', '', mises_stress), &
       frame_field_t('zero_energy', '1', 'root mean square over the family of the part of the '// &
@@ -121,6 +122,18 @@ contains
 
     call take_blocks(view, plastic_strain_of_block, values)
   end subroutine plastic_strain
+
+  subroutine det_f(view, values)
+    type(points_view_t), intent(in)  :: view
+    real(wp),            intent(out), contiguous :: values(:, :)
+    integer :: i
+
+    associate (h => view%state%displacement_gradient, row => view%model%operators%storage%row)
+      do i = 1, size(values, 2)
+        values(1, i) = determinant(h(row(i), :))
+      end do
+    end associate
+  end subroutine det_f
 
   !> The rms of the zero-energy part of the deformation, weighted with omega V over the family, over
   !> the horizon.

@@ -6,7 +6,8 @@
 module pd_history_columns
   use pd_kinds, only: block_dot, block_sum, n_block, wp
   use pd_model, only: model_t
-  use pd_observe, only: block_view_t, column_t, largest, mean, row_view_t, surplus, total
+  use pd_observe, only: block_view_t, column_t, largest, mean, row_view_t, smallest, &
+    surplus, total
   implicit none
   private
 
@@ -53,6 +54,8 @@ contains
       'and of the moving frame of the damping so far', value=external_work))
     call add(columns, column_t('energy_error', '1', 'what the balance lacks, over the external '// &
       'work or the initial kinetic energy', value=energy_error))
+    call add(columns, column_t('min_det_f', '1', 'smallest det F, volume over that of the '// &
+      'undeformed body,'//in_body, joined=smallest, part=det_f))
   end subroutine history_columns
 
   subroutine add(columns, column)
@@ -117,6 +120,27 @@ contains
       found = max(found, merge(values(b), 0.0_wp, weight(b) > 0.0_wp))
     end do
   end function largest_with_weight
+
+  !> Smallest det F of the points with a weight, or huge; without a branch.
+  pure real(wp) function det_f(block) result(found)
+    type(block_view_t), intent(in) :: block
+
+    found = smallest_det_f(block%lo, block%hi, block%weight, block%state%displacement_gradient)
+  end function det_f
+
+  pure real(wp) function smallest_det_f(lo, hi, weight, h) result(found)
+    integer,  intent(in) :: lo, hi
+    real(wp), intent(in) :: weight(n_block)
+    real(wp), intent(in), contiguous :: h(:, :)   !! H (n,4)
+    integer :: i
+
+    found = huge(1.0_wp)
+    !$omp simd simdlen(8) reduction(min:found)
+    do i = lo, hi
+      found = min(found, merge((1.0_wp + h(i, 1)) * (1.0_wp + h(i, 4)) - h(i, 2) * h(i, 3), &
+        huge(1.0_wp), weight(i - lo + 1) > 0.0_wp))
+    end do
+  end function smallest_det_f
 
   pure real(wp) function kinetic_energy(block) result(part)
     type(block_view_t), intent(in) :: block

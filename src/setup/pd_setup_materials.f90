@@ -8,11 +8,13 @@ module pd_setup_materials
   use pd_j2, only: new_j2
   use pd_kinds, only: is_set, wp
   use pd_law, only: law_t
+  use pd_logarithmic, only: logarithmic_t
   use pd_materials, only: divide_into_runs
   use pd_measure, only: measure_t
   use pd_model, only: model_t
   use pd_operators, only: control_stiffness
   use pd_random_field, only: lognormal, new_random_field, standard_normal
+  use pd_small_strain, only: small_strain_t
   implicit none
   private
 
@@ -93,7 +95,13 @@ contains
     character(*), intent(in) :: name
     class(measure_t), allocatable :: measure
 
-    if (name == 'green_lagrange') allocate (green_lagrange_t :: measure)
+    if (name == 'green_lagrange') then
+      allocate (green_lagrange_t :: measure)
+    else if (name == 'logarithmic') then
+      allocate (logarithmic_t :: measure)
+    else if (name == 'small') then
+      allocate (small_strain_t :: measure)
+    end if
   end function new_measure
 
   !> Control of zero-energy modes after Silling, with the stiffness of each point's material.

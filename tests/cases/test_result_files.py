@@ -13,6 +13,7 @@ DATASETS = {
     "stress": (4, "Pa"),
     "strain": (4, "1"),
     "plastic_strain": (0, "1"),
+    "det_f": (0, "1"),
     "von_mises": (0, "Pa"),
     "zero_energy": (0, "1"),
 }
@@ -62,7 +63,7 @@ UNITS = (
     (r"\w+_force_[xy]$", "N/m"),
     (r"mean_stress_", "Pa"),
     (r"\w+_(energy|dissipation|work)$", "J/m"),
-    (r"(step|strain|mean_strain_yy|max_plastic_strain|energy_error)$", "1"),
+    (r"(step|strain|mean_strain_yy|max_plastic_strain|energy_error|min_det_f)$", "1"),
 )
 
 

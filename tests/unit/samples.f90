@@ -12,6 +12,7 @@ module samples
   use pd_kinds, only: wp
   use pd_law, only: flow_t, law_points_t, law_t
   use pd_materials, only: divide_into_runs, material_t, materials_t
+  use pd_measure, only: measure_t
   use pd_model, only: model_t
   use pd_operators, only: control_stiffness, operators_t
   use pd_shape_tensor, only: invert_shape_tensors
@@ -141,15 +142,20 @@ contains
     body%upper = maxval(body%position, dim=1)
   end function jittered_cloud
 
-  !> A material of 2000 kg/m^3 or another density, with the strain of Green and Lagrange.
-  function new_material(law, density) result(material)
-    class(law_t), intent(in)           :: law
-    real(wp),     intent(in), optional :: density
+  !> A material of 2000 kg/m^3 or another density, with the strain of Green and Lagrange or another.
+  function new_material(law, density, measure) result(material)
+    class(law_t), intent(in)               :: law
+    real(wp),     intent(in), optional     :: density
+    class(measure_t), intent(in), optional :: measure
     type(material_t) :: material
 
     material%name = 'soil'
     allocate (material%law, source=law)
-    allocate (green_lagrange_t :: material%measure)
+    if (present(measure)) then
+      allocate (material%measure, source=measure)
+    else
+      allocate (green_lagrange_t :: material%measure)
+    end if
     material%density = 2000.0_wp
     if (present(density)) material%density = density
     material%youngs_modulus = 50.0e6_wp

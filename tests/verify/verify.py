@@ -257,6 +257,41 @@ def plateau() -> list[Row]:
     ]
 
 
+def measures() -> list[Row]:
+    """Perfect plasticity up to 2 % of strain, in the measures whose plastic flow keeps the volume.
+
+    With small strain the stress of the platen stays 2 sigma_y / sqrt(3); with logarithmic strain
+    that is the true stress, times the area that grows: (2 sigma_y / sqrt(3)) / (1 - strain).
+    """
+    rows = []
+    for name in ("small", "logarithmic"):
+        groups = [
+            *specimen(0.05, 0.15, volumes="tributary"),
+            material(strain_measure=name),
+            *platens("smooth", rate=0.005),
+            (
+                "integration",
+                {"final_strain": 0.02, "damping": 5.0e5, "damping_frame": "platens"},
+            ),
+            ("output", {"history_count": 400, "frame_count": 1}),
+        ]
+        curve = stress_strain(run(f"measures_{name}", groups))
+        for strain in (0.01, 0.02):
+            spread = 1.0 - strain if name == "logarithmic" else 1.0
+            rows.append(
+                Row(
+                    "measures",
+                    f"plateau at {100.0 * strain:.0f} %, {name} strain",
+                    "kPa",
+                    2.0 * SIGMA_Y / ROOT_3 / spread / 1e3,
+                    float(np.interp(strain, curve.x, curve.y)) / 1e3,
+                    5.0e-3,
+                    "closed form",
+                )
+            )
+    return rows
+
+
 def shear(name: str, end: float, table: dict[str, object], **keys: object) -> Run:
     """Simple shear of one point at 0.02 / s times a table, with 400 frames."""
     return run(
@@ -627,6 +662,7 @@ CASES: dict[str, Callable[[], list[Row]]] = {
     "modulus": moduli,
     "elastic": uniaxial,
     "plateau": plateau,
+    "measures": measures,
     "softening": softening,
     "cyclic": cyclic,
     "wave": wave,

@@ -125,6 +125,7 @@ _LABELS = {
     "max_shear_stress": "Largest shear stress in the plane",
     "max_shear_strain": "Largest shear strain in the plane",
     "volumetric_strain": "Volumetric strain",
+    "det_f": "det F",
     "displacement_magnitude": "Displacement |u|",
     "velocity_magnitude": "Velocity |v|",
 }
