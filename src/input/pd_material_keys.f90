@@ -52,9 +52,10 @@ contains
       meaning='name by which a body asks for the material'), self%name)
     call visitor%text_key(key_t('model', required=.true., choices='elastic j2', &
       meaning='elastic, or von Mises plasticity with hardening or softening'), self%model)
-    call visitor%text_key(key_t('strain_measure', default='green_lagrange', &
-      choices='green_lagrange logarithmic small', meaning='strain in which the law is written'), &
-      self%strain_measure)
+    call visitor%text_key(key_t('strain_measure', default='logarithmic', &
+      choices='green_lagrange logarithmic small', meaning='strain in which the law is written: ' &
+      //'logarithmic for any use, small to compare with limit theorems, green_lagrange to ' &
+      //'compare with the paper'), self%strain_measure)
     call visitor%real_key(key_t('density', unit='kg/m^3', required=.true., range=positive, &
       meaning='mass per volume'), self%density)
     call visitor%real_key(key_t('youngs_modulus', unit='Pa', required=.true., range=positive, &

@@ -36,7 +36,8 @@ INPUT = """\
 &run name = '{name}', output_dir = '{folder}', operators = '{operators}' /
 &discretisation spacing = {dx}, horizon = {delta} /
 &body x_max = {width}, x_min = 0.0, y_min = 0.0, y_max = {height} /
-&material model = 'j2', density = 2000.0, youngs_modulus = 50e6, poissons_ratio = 0.3,
+&material model = 'j2', strain_measure = 'green_lagrange', density = 2000.0,
+  youngs_modulus = 50e6, poissons_ratio = 0.3,
   yield_stress = 0.15e6, kinematic_modulus = -1.5e6, residual_strength = 15e3 /
 &boundary name = 'bottom', side = 'bottom' /
 &boundary name = 'top', side = 'top', contact = 'smooth', velocity = 0.0, -0.01 /

@@ -36,7 +36,8 @@ BODY = """\
 &run name = 'case', output_dir = 'out', operators = 'lattice' /
 &discretisation spacing = 0.1, horizon = 0.25, layout = 'nodes', volumes = 'uniform' /
 &body x_min = 0.0, x_max = 0.5, y_min = 0.0, y_max = 1.0 /
-&material model = 'j2', density = 2000.0, youngs_modulus = 50.0e6, poissons_ratio = 0.3
+&material model = 'j2', strain_measure = 'green_lagrange', density = 2000.0
+  youngs_modulus = 50.0e6, poissons_ratio = 0.3
   yield_stress = 0.15e6, kinematic_modulus = -1.5e6, residual_strength = 15.0e3 /
 &output frame_count = 2, history_count = 8 /
 """
@@ -57,7 +58,8 @@ SIDEWAYS = """\
 LAYERS = """\
 &body x_min = 0.5, x_max = 0.8, y_min = 0.0, y_max = 0.4, material = 'rock' /
 &body x_min = 0.0, x_max = 0.5, y_min = 0.6, y_max = 1.0, material = 'rock' /
-&material name = 'rock', model = 'elastic', density = 2500.0, youngs_modulus = 80.0e6
+&material name = 'rock', model = 'elastic', strain_measure = 'green_lagrange'
+  density = 2500.0, youngs_modulus = 80.0e6
   poissons_ratio = 0.2 /
 """
 PATCH = "&imperfection amplitude = 0.1, x = 0.0, y = 0.3, radius = 0.15 /\n"
