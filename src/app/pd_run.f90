@@ -82,6 +82,10 @@ contains
           materials%list(k)%name//'''; &body material chooses one', run%input%path)
       end associate
     end do
+    if (.not. allocated(run%model%body%place) .and. run%input%stabilisation%method == 'none') &
+      call run%warnings%add('points off a lattice without control: a homogeneous stress is not '// &
+      'in equilibrium inside them, and stresses come out too small; a control of zero-energy '// &
+      'modes helps', '&stabilisation method')
     if (run%checkpoint%history_rows > 0) then
       if (.not. same_history(run%state, run%model)) &
         call errors%add('the laws remember something else than in the checkpoint', run%input%path, &

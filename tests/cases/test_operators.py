@@ -1,5 +1,6 @@
 """Runs with the two forms of the operators agree: bond list and lattice."""
 
+import re
 import signal
 import subprocess
 import time
@@ -238,3 +239,26 @@ def test_a_point_cloud_has_no_lattice_form(run_case, tmp_path, form, status):
     if status == 2:
         assert "&run operators" in done.stderr
         assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(("jitter", "least", "most"), [(0.0, 0.0, 1e-10), (0.2, 0.05, 1.0)])
+def test_irregular_points_are_told_how_far_from_balance_they_are(
+    run_case, tmp_path, jitter, least, most
+):
+    way = 0.1 * np.random.default_rng(3).uniform(-jitter, jitter, (21, 21, 2))
+    points = [
+        f"{0.1 * i + way[i, j, 0]:.9f} {0.1 * j + way[i, j, 1]:.9f} 0.01"
+        for i in range(21)
+        for j in range(21)
+    ]
+    (tmp_path / "cloud.txt").write_text("\n".join([*points, ""]))
+    text = CLOUD.replace("operators = 'lattice' ", "")
+    done = run_case(text, tmp_path, "--check")
+    assert done.returncode == 0, done.stderr
+    assert "&stabilisation method: points off a lattice" in done.stdout + done.stderr
+    found = re.findall(r"^ *imbalance +([^:]+):", done.stdout, re.MULTILINE)
+    assert least <= float(found[0]) <= most
+    done = run_case(
+        text + "&stabilisation method = 'silling', factor = 0.0125 /\n", tmp_path, "--check"
+    )
+    assert done.returncode == 0 and "off a lattice" not in done.stdout + done.stderr
