@@ -53,7 +53,6 @@ contains
     type(run_t),     intent(inout) :: run
     type(outcome_t), intent(inout) :: outcome
     type(error_list_t) :: errors, input_errors
-    integer :: k
 
     call read_input(options%input_path, run%input, errors, options%settings)
     call outcome%end_if_any(errors, exit_input)
@@ -76,16 +75,7 @@ contains
     call set_up_model(run%input, run%model, errors)
     call outcome%end_if_any(errors, exit_model)
     if (outcome%done) return
-    do k = 1, size(run%model%materials%list)
-      associate (materials => run%model%materials)
-        if (.not. materials%is_used(k)) call run%warnings%add('no point has the material '''// &
-          materials%list(k)%name//'''; &body material chooses one', run%input%path)
-      end associate
-    end do
-    if (.not. allocated(run%model%body%place) .and. run%input%stabilisation%method == 'none') &
-      call run%warnings%add('points off a lattice without control: a homogeneous stress is not '// &
-      'in equilibrium inside them, and stresses come out too small; a control of zero-energy '// &
-      'modes helps', '&stabilisation method')
+    call look_at_model(run)
     if (run%checkpoint%history_rows > 0) then
       if (.not. same_history(run%state, run%model)) &
         call errors%add('the laws remember something else than in the checkpoint', run%input%path, &
@@ -98,6 +88,23 @@ contains
     call outcome%end_if_any(errors, exit_input)
     if (.not. outcome%done .and. .not. options%check) call begin_state(run)
   end subroutine set_up_run
+
+  !> Warn of what can be set up and is hardly meant.
+  subroutine look_at_model(run)
+    type(run_t), intent(inout) :: run
+    integer :: k
+
+    associate (materials => run%model%materials, path => run%input%path)
+      do k = 1, size(materials%list)
+        if (.not. materials%is_used(k)) call run%warnings%add('no point has the material '''// &
+          materials%list(k)%name//'''; &body material chooses one', path)
+      end do
+    end associate
+    if (.not. allocated(run%model%body%place) .and. run%input%stabilisation%method == 'none') &
+      call run%warnings%add('points off a lattice without control: a homogeneous stress is not '// &
+      'in equilibrium inside them, and stresses come out too small; a control of zero-energy '// &
+      'modes helps', '&stabilisation method')
+  end subroutine look_at_model
 
   !> Results of an earlier run are overwritten or continued only on request; a checkpoint is read
   !> if the run continues from it.

@@ -39,6 +39,8 @@ module pd_geometry
   type :: layer_t
     character(:), allocatable :: side           !! 'bottom' | 'top' | 'left' | 'right' | 'all'
     integer :: boundary                         !! index of the boundary they belong to
+    real(wp), allocatable :: span(:)            !! part of the side: from, to [m]; not allocated:
+                                                !! all of it
   end type layer_t
 
   !> Occupied places of a lattice in a box of columns and rows; index 0 is the lower left place
@@ -92,7 +94,7 @@ contains
 
     call fill_rectangles(first, last, start, counts, lattice, places)
     do k = 1, size(layers)
-      call fill_layer(layers(k), layers, counts, lattice, places)
+      call fill_layer(layers(k), layers, origin, counts, lattice, places)
       if (.not. any(places%owner == layers(k)%boundary)) then
         call errors%add('a boundary holds no point', '&boundary side = '//layers(k)%side)
       end if
@@ -127,37 +129,28 @@ contains
   end subroutine fill_rectangles
 
   !> Mark the fictitious points beyond a side: under (above, beside) every point of the outermost
-  !> row. Where layers of two sides meet, the corner block belongs to the bottom or top side.
+  !> row, or those strictly inside a span. Where layers of two whole sides meet, the corner block
+  !> belongs to the bottom or top side.
   !>
   !> The squares extend one row beyond the points: the outermost row stands for a body that goes
   !> on, so that its points have whole cells across the layer.
-  subroutine fill_layer(layer, layers, counts, lattice, places)
+  subroutine fill_layer(layer, layers, origin, counts, lattice, places)
     type(layer_t),   intent(in)    :: layer
     type(layer_t),   intent(in)    :: layers(:)
+    real(wp),        intent(in)    :: origin(2)   !! of place 0, 0 [m]
     integer,         intent(in)    :: counts(2)
     type(lattice_t), intent(in)    :: lattice
     type(places_t),  intent(inout) :: places
-    integer :: outer(2), i, p
+    integer :: outer(2), on_line(2), squares(2), p
 
     p = lattice%rows
     outer = merge(counts - 1, counts, lattice%cells)
-    associate (owner => places%owner, filled => places%filled)
-      if (on(left)) then
-        do i = 1, p + 1
-          if (i <= p) where (owner(0, 0:outer(2)) == 0) owner(-i, 0:outer(2)) = layer%boundary
-          filled(-i, 0:counts(2) - 1) = filled(0, 0:counts(2) - 1)
-        end do
-      end if
-      if (on(right)) then
-        do i = 1, p + 1
-          if (i <= p) where (owner(outer(1), 0:outer(2)) == 0) &
-            owner(outer(1) + i, 0:outer(2)) = layer%boundary
-          filled(counts(1) - 1 + i, 0:counts(2) - 1) = filled(counts(1) - 1, 0:counts(2) - 1)
-        end do
-      end if
-      if (on(bottom)) call fill_row(0, -1)
-      if (on(top)) call fill_row(outer(2), 1)
-    end associate
+    call find_range(layer, origin(2), counts(2), lattice, on_line, squares)
+    if (on(left)) call fill_column(0, -1)
+    if (on(right)) call fill_column(outer(1), 1)
+    call find_range(layer, origin(1), counts(1), lattice, on_line, squares)
+    if (on(bottom)) call fill_row(0, -1)
+    if (on(top)) call fill_row(outer(2), 1)
 
   contains
 
@@ -168,43 +161,85 @@ contains
       on = covers(layer%side, side)
     end function on
 
-    !> Whether any layer lies on a side.
+    !> Whether a layer lies on a whole side.
     logical function any_on(side)
       integer, intent(in) :: side
       integer :: k
 
       any_on = .false.
       do k = 1, size(layers)
-        any_on = any_on .or. covers(layers(k)%side, side)
+        any_on = any_on .or. covers(layers(k)%side, side) .and. .not. allocated(layers(k)%span)
       end do
     end function any_on
 
-    !> Layers beyond the points of row y, in direction step, corner blocks included.
+    !> Layers beyond the points of column x, in direction step.
+    subroutine fill_column(x, step)
+      integer, intent(in) :: x, step
+      integer :: k, square
+
+      square = merge(0, counts(1) - 1, step < 0)
+      associate (owner => places%owner, filled => places%filled, a => on_line(1), &
+        b => on_line(2), c => squares(1), d => squares(2))
+        do k = 1, p + 1
+          if (k <= p) where (owner(x, a:b) == 0) owner(x + step * k, a:b) = layer%boundary
+          filled(square + step * k, c:d) = filled(square, c:d)
+        end do
+      end associate
+    end subroutine fill_column
+
+    !> Layers beyond the points of row y, in direction step; on a whole side corner blocks included.
     subroutine fill_row(y, step)
       integer, intent(in) :: y, step
       integer :: from, to, square_row, k, columns(2)
 
       square_row = merge(0, counts(2) - 1, step < 0)
       columns = [0, outer(1)]
-      if (any_on(left) .and. places%owner(0, y) == 0) columns(1) = -p
-      if (any_on(right) .and. places%owner(outer(1), y) == 0) columns(2) = outer(1) + p
+      if (.not. allocated(layer%span)) then
+        if (any_on(left) .and. places%owner(0, y) == 0) columns(1) = -p
+        if (any_on(right) .and. places%owner(outer(1), y) == 0) columns(2) = outer(1) + p
+      end if
       from = columns(1)
       to = columns(2)
-      do k = 1, p + 1
-        if (k <= p) then
-          where (places%owner(0:outer(1), y) == 0) &
-            places%owner(0:outer(1), y + step * k) = layer%boundary
-          places%owner(from:-1, y + step * k) = layer%boundary
-          places%owner(outer(1) + 1:to, y + step * k) = layer%boundary
-        end if
-        places%filled(0:counts(1) - 1, square_row + step * k) = &
-          places%filled(0:counts(1) - 1, square_row)
-        if (from < 0) places%filled(-p - 1:-1, square_row + step * k) = .true.
-        if (to > outer(1)) places%filled(counts(1):counts(1) + p, square_row + step * k) = .true.
-      end do
+      associate (owner => places%owner, filled => places%filled, a => on_line(1), &
+        b => on_line(2), c => squares(1), d => squares(2))
+        do k = 1, p + 1
+          if (k <= p) then
+            where (owner(a:b, y) == 0) owner(a:b, y + step * k) = layer%boundary
+            owner(from:-1, y + step * k) = layer%boundary
+            owner(outer(1) + 1:to, y + step * k) = layer%boundary
+          end if
+          filled(c:d, square_row + step * k) = filled(c:d, square_row)
+          if (from < 0) filled(-p - 1:-1, square_row + step * k) = .true.
+          if (to > outer(1)) filled(counts(1):counts(1) + p, square_row + step * k) = .true.
+        end do
+      end associate
     end subroutine fill_row
 
   end subroutine fill_layer
+
+  !> The places along a side that are strictly inside the span of a layer, and the squares that it
+  !> covers.
+  pure subroutine find_range(layer, origin, n, lattice, on_line, squares)
+    type(layer_t),   intent(in)  :: layer
+    real(wp),        intent(in)  :: origin       !! coordinate of place 0 [m]
+    integer,         intent(in)  :: n            !! squares along the side
+    type(lattice_t), intent(in)  :: lattice
+    integer,         intent(out) :: on_line(2)   !! first and last place
+    integer,         intent(out) :: squares(2)   !! first and last square
+    real(wp), parameter :: round_off = 1.0e-6_wp
+    real(wp) :: ends(2), offset
+
+    squares = [0, n - 1]
+    on_line = [0, merge(n - 1, n, lattice%cells)]
+    if (.not. allocated(layer%span)) return
+    offset = merge(0.5_wp, 0.0_wp, lattice%cells)
+    ends = min(real(n, wp) + 1.0_wp, max(-1.0_wp, (layer%span - origin) / lattice%spacing))
+    on_line(1) = max(on_line(1), floor(ends(1) - offset + round_off) + 1)
+    on_line(2) = min(on_line(2), ceiling(ends(2) - offset - round_off) - 1)
+    squares(1) = max(squares(1), floor(ends(1) + round_off))
+    squares(2) = min(squares(2), ceiling(ends(2) - round_off) - 1)
+    if (lattice%cells) squares = on_line
+  end subroutine find_range
 
   !> The rectangle of every point: the last one that holds it. A layer continues what is beside it.
   pure subroutine find_parts(places, counts, lattice, body)

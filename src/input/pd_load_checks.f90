@@ -37,6 +37,7 @@ contains
       else
         call add_useless(group, 'ramp_time', 'without traction', errors)
       end if
+      call check_part(input, input%boundaries(k), group, errors)
     end do
     if (platen_under_load(input)) call check_strains(input, groups, errors)
     do k = 1, size(input%pressures)
@@ -44,7 +45,7 @@ contains
       group = group_named(groups, 'pressure', k, input%path)
       call check_name(input, k, group, errors)
       call check_side(input, k, group, errors)
-      call check_span(input, k, group, errors)
+      call check_span(input, input%pressures(k)%side, input%pressures(k)%span, group, errors)
     end do
   end subroutine check_loads
 
@@ -139,33 +140,51 @@ contains
     end do
   end subroutine check_side
 
-  !> The span of pressure k within its side. Extents that will be adjusted may differ by a spacing.
-  subroutine check_span(input, k, group, errors)
+  !> A span within its side. Extents that will be adjusted may differ by a spacing.
+  subroutine check_span(input, side, span, group, errors)
     type(input_t),          intent(in)    :: input
-    integer,                intent(in)    :: k
+    character(*),           intent(in)    :: side
+    real(wp),               intent(in)    :: span(:)   !! from, to [m]; size 0: none
     type(namelist_group_t), intent(in)    :: group
     type(error_list_t),     intent(inout) :: errors
     real(wp) :: lower, upper, slack
 
-    associate (p => input%pressures(k), spacing => input%discretisation%spacing)
-      if (size(p%span) == 0) return
-      call check_increasing(p%span, 'span', group, errors)
-      if (p%span(2) <= p%span(1) .or. p%side == '' .or. is_cloud(input)) return
-      if (size(input%bodies) == 0 .or. .not. is_set(spacing)) return
-      if (normal_axis(p%side) == 2) then
-        lower = minval(input%bodies%x_min)
-        upper = maxval(input%bodies%x_max)
-      else
-        lower = minval(input%bodies%y_min)
-        upper = maxval(input%bodies%y_max)
-      end if
-      if (.not. (is_set(lower) .and. is_set(upper))) return
-      slack = merge(1.0_wp, 1.0e-6_wp, input%discretisation%fit == 'nearest')*spacing
-      if (p%span(1) < lower - slack .or. p%span(2) > upper + slack) call errors%add( &
-        'the span goes beyond the side', where=place_of(group, 'span'), &
-        found=number_text(p%span(1))//', '//number_text(p%span(2)), &
-        allowed='within '//number_text(lower)//' to '//number_text(upper)//' [m]')
-    end associate
+    if (size(span) == 0) return
+    call check_increasing(span, 'span', group, errors)
+    if (span(2) <= span(1) .or. normal_axis(side) == 0 .or. is_cloud(input)) return
+    if (size(input%bodies) == 0 .or. .not. is_set(input%discretisation%spacing)) return
+    if (normal_axis(side) == 2) then
+      lower = minval(input%bodies%x_min)
+      upper = maxval(input%bodies%x_max)
+    else
+      lower = minval(input%bodies%y_min)
+      upper = maxval(input%bodies%y_max)
+    end if
+    if (.not. (is_set(lower) .and. is_set(upper))) return
+    slack = merge(1.0_wp, 1.0e-6_wp, input%discretisation%fit == 'nearest') &
+      * input%discretisation%spacing
+    if (span(1) < lower - slack .or. span(2) > upper + slack) call errors%add( &
+      'the span goes beyond the side', where=place_of(group, 'span'), &
+      found=number_text(span(1))//', '//number_text(span(2)), &
+      allowed='within '//number_text(lower)//' to '//number_text(upper)//' [m]')
   end subroutine check_span
+
+  !> What a boundary on a part of a side cannot be.
+  subroutine check_part(input, b, group, errors)
+    type(input_t),          intent(in)    :: input
+    type(boundary_input_t), intent(in)    :: b
+    type(namelist_group_t), intent(in)    :: group
+    type(error_list_t),     intent(inout) :: errors
+
+    if (.not. is_given(group, 'span')) return
+    if (is_cloud(input)) call errors%add('a span on a point cloud', &
+      where=place_of(group, 'span'), found='shape = ''file''', allowed='only for rectangles')
+    if (b%side == 'all') call errors%add('a span on all sides', &
+      where=place_of(group, 'side'), found='''all''', &
+      allowed='''bottom'', ''top'', ''left'', ''right''')
+    if (is_given(group, 'traction')) call errors%add('a traction on a part of a side', &
+      where=place_of(group, 'span'), found='both', allowed='a span or a traction')
+    call check_span(input, b%side, b%span, group, errors)
+  end subroutine check_part
 
 end module pd_load_checks

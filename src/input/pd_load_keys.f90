@@ -11,6 +11,7 @@ module pd_load_keys
 
   type :: boundary_input_t
     character(:), allocatable :: name, side, contact   !! side: '' where a point cloud names it
+    real(wp), allocatable :: span(:)                   !! from, to [m]; size 0: the whole side
     real(wp) :: velocity(2) = 0.0_wp                   !! [m/s]
     real(wp), allocatable :: times(:)                  !! [s]; size 0: no table
     real(wp), allocatable :: velocities_x(:), velocities_y(:)   !! [m/s]; size 0: zero
@@ -43,9 +44,13 @@ contains
     call visitor%text_key(key_t('name', required=.true., is_name=.true., also='each name once', &
       meaning='name in the results, and in the file of a point cloud'), self%name)
     call visitor%text_key(key_t('side', stands_for='none', choices='bottom top left right all', &
-      also='needed for rectangles, each side once, all alone; not all for a cloud', &
+      also='needed for rectangles, each side or span once, all alone; not all for a cloud', &
       meaning='side of the body beyond which the layers of points lie; for a cloud the side ' &
       //'that the boundary stands for'), self%side)
+    call visitor%list_key(key_t('span', count=2, unit='m', stands_for='the whole side', &
+      also='increasing, within the side; rectangles only; not with traction, not all', &
+      meaning='part of the side, as of a footing: from, to, in the coordinate along it; the ' &
+      //'layers hold the points strictly inside'), self%span)
     call visitor%text_key(key_t('contact', default='rough', choices='rough smooth affine', &
       also='smooth needs one side, not all', &
       meaning='rough: both components of the motion prescribed; smooth: only the one across ' &

@@ -77,9 +77,10 @@ contains
       if (.not. is_given(group, 'side')) call add_missing(group, 'side', 'for rectangles', errors)
       if (b%side == '') return
       do j = 1, k - 1
+        if (apart(input%boundaries(j)%span, b%span)) cycle
         if (input%boundaries(j)%side == b%side) then
           call errors%add('two boundaries lie on the same side', where=place_of(group, 'side'), &
-                          found=''''//b%side//'''', allowed='each side once')
+            found=''''//b%side//'''', allowed='each side once, or spans that do not overlap')
           return
         else if (input%boundaries(j)%side /= '' &
                  .and. (b%side == 'all' .or. input%boundaries(j)%side == 'all')) then
@@ -91,6 +92,14 @@ contains
       end do
     end associate
   end subroutine check_side
+
+  !> Whether two boundaries stand on parts of a side that do not overlap.
+  pure logical function apart(one, other)
+    real(wp), intent(in) :: one(:), other(:)   !! from, to [m]; size 0: the whole side
+
+    apart = .false.
+    if (size(one) == 2 .and. size(other) == 2) apart = one(2) <= other(1) .or. other(2) <= one(1)
+  end function apart
 
   !> How one boundary moves.
   subroutine check_movement(b, group, errors)

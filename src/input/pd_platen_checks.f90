@@ -12,7 +12,7 @@ module pd_platen_checks
 contains
 
   !> Indices of the platens, the one at the lower end of their axis first: exactly two boundaries,
-  !> on opposite sides, neither affine; 0, 0 where there are none.
+  !> on opposite sides, whole ones, neither affine; 0, 0 where there are none.
   pure function platens_of(boundaries) result(platens)
     type(boundary_input_t), intent(in) :: boundaries(:)
     integer :: platens(2)
@@ -21,6 +21,7 @@ contains
     if (size(boundaries) /= 2) return
     associate (a => boundaries(1), b => boundaries(2))
       if (a%contact == 'affine' .or. b%contact == 'affine') return
+      if (size(a%span) > 0 .or. size(b%span) > 0) return
       if (normal_axis(a%side) /= normal_axis(b%side)) return
       if (outward(a%side) < outward(b%side)) platens = [1, 2]
       if (outward(a%side) > outward(b%side)) platens = [2, 1]

@@ -98,6 +98,7 @@ contains
     do k = 1, size(layers)
       layers(k)%side = input%boundaries(k)%side
       layers(k)%boundary = k
+      if (size(input%boundaries(k)%span) == 2) layers(k)%span = input%boundaries(k)%span
     end do
     call lattice_body(lower, upper, lattice, layers, body, errors)
     asked = [(lower(:, k), upper(:, k), k=1, size(lower, 2))]

@@ -98,6 +98,22 @@ MISTAKES = {
         "&pressure name = 'p', side = 'left' /\n&output",
         "&pressure value: the key is missing; allowed: any number [Pa]",
     ),
+    "boundaries on parts of a side that overlap": (
+        "&output",
+        "&boundary name = 'one', side = 'left', span = 0.1, 0.5 /\n"
+        "&boundary name = 'two', side = 'left', span = 0.4, 0.8 /\n&output",
+        "two boundaries lie on the same side; found: 'left'; allowed: each side once, or spans",
+    ),
+    "boundary beyond its side": (
+        "&output",
+        "&boundary name = 'one', side = 'left', span = 0.5, 1.2 /\n&output",
+        "the span goes beyond the side; found: 0.5, 1.2; allowed: within 0.0 to 1.0 [m]",
+    ),
+    "traction on a part of a side": (
+        "&output",
+        "&boundary name = 'one', side = 'left', span = 0.1, 0.5, traction = 1.0, 0.0 /\n&output",
+        "a traction on a part of a side; found: both; allowed: a span or a traction",
+    ),
     "motion and traction": (
         "velocity = 0.0, -0.01",
         "velocity = 0.0, -0.01, traction = 0.0, -1.0",
@@ -304,7 +320,10 @@ def test_what_is_printed_says_what_was_set_and_reads_back(run_case, tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["run.nml"]
 
 
-@pytest.mark.parametrize("path", sorted((ROOT / "input").glob("*.nml")), ids=lambda path: path.stem)
+INPUTS = sorted((ROOT / "input").rglob("*.nml"))
+
+
+@pytest.mark.parametrize("path", INPUTS, ids=lambda path: path.stem)
 def test_inputs_printed_read_back(perigeo, tmp_path, path):
     for cloud in path.parent.glob("*.txt"):
         (tmp_path / cloud.name).write_bytes(cloud.read_bytes())

@@ -261,4 +261,5 @@ def test_irregular_points_are_told_how_far_from_balance_they_are(
     done = run_case(
         text + "&stabilisation method = 'silling', factor = 0.0125 /\n", tmp_path, "--check"
     )
-    assert done.returncode == 0 and "off a lattice" not in done.stdout + done.stderr
+    assert done.returncode == 0, done.stderr
+    assert "off a lattice" not in done.stdout + done.stderr

@@ -576,12 +576,34 @@ def traction() -> list[Row]:
     ]
 
 
-def shipped(name: str) -> Run:
+def footing() -> list[Row]:
+    """Rough strip footing on clay, input/limit_loads/strip_footing.nml: (2 + pi) c B."""
+    result = shipped("limit_loads/strip_footing")
+    history = result.history()
+    settlement = 0.01 * history["time"]
+    load = np.abs(history["footing_force_y"])
+    plateau = settlement >= 0.025
+    return [
+        Row(
+            "footing",
+            f"limit load of a rough strip footing, {what} of 2.5 to 5 % of B",
+            "kN/m",
+            (2.0 + np.pi) * 10.0,
+            float(value) / 1e3,
+            1.0e-2,
+            "closed form",
+        )
+        for what, value in (("mean", load[plateau].mean()), ("largest", load[plateau].max()))
+    ]
+
+
+def shipped(path: str) -> Run:
     """Run an input of the folder input/."""
+    name = Path(path).name
     folder = RESULTS / name
     folder.mkdir(parents=True, exist_ok=True)
     command = [str(PROGRAM), "--threads", "1", "--force", "--quiet", "--output", str(folder)]
-    return execute(name, folder, [*command, str(ROOT / "input" / f"{name}.nml")])
+    return execute(name, folder, [*command, str(ROOT / "input" / f"{path}.nml")])
 
 
 def compression() -> list[Row]:
@@ -670,6 +692,7 @@ CASES: dict[str, Callable[[], list[Row]]] = {
     "traction": traction,
     "compression": compression,
     "perfect": perfect,
+    "footing": footing,
 }
 
 
