@@ -84,12 +84,12 @@ def _mark(ax: Axes, curve: Curve, marks: Sequence[float]) -> None:
     factor, _ = prefix_for(
         float(np.nanmax(np.abs(curve.y))) if np.isfinite(curve.y).any() else 0.0, curve.y_unit
     )
-    sign = -1.0 if curve.tension_positive else 1.0
     for strain in marks:
-        y = curve.at(sign * strain) * factor
-        ax.plot([100.0 * sign * strain], [y], "o", color="black", zorder=5)
+        x = curve.toward(strain)
+        y = curve.at(x) * factor
+        ax.plot([100.0 * x], [y], "o", color="black", zorder=5)
         ax.annotate(
-            f"{100.0 * strain:g} %", (100.0 * sign * strain, y), xytext=(0, 5),
+            f"{100.0 * strain:g} %", (100.0 * x, y), xytext=(0, 5),
             textcoords="offset points", fontsize=7, ha="center",
         )  # fmt: skip
 

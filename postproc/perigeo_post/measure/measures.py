@@ -125,9 +125,8 @@ def compare_runs(
         if run.platens is not None:
             curve = stress_strain(run, tension_positive)
             row["peak_stress"], row["strain_at_peak"] = peak(curve)
-            sign = -1.0 if tension_positive else 1.0
             for s in strains:
-                row[f"stress_at_{s:g}"] = curve.at(sign * s)
+                row[f"stress_at_{s:g}"] = curve.at(curve.toward(s))
             row["apparent_modulus"] = modulus_numbers(run)["apparent_modulus"]
         for s in strains:
             try:

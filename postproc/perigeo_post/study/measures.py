@@ -305,7 +305,7 @@ _BRANCH = {
     "strain_at_90": Column("1", "nominal strain where the stress has fallen to 90 % of its peak"),
     "strain_at_50": Column("1", "nominal strain where it has fallen to 50 %"),
     "softening_slope": Column("Pa", "fall of stress over strain between 90 and 50 % of the peak"),
-    "softening_displacement": Column("m", "approach of the platens between 90 and 50 %"),
+    "softening_displacement": Column("m", "motion of the platens between 90 and 50 %"),
 }
 _BRITTLENESS = {
     "brittleness": Column("1", "softening_slope over the elastic slope"),
@@ -314,7 +314,9 @@ _STRESS_RATIO = {
     "stress_ratio": Column("1", "axial stress at the state over its peak"),
 }
 _STRESSES = {
-    f"stress_{name}": Column("Pa", f"axial stress at {100.0 * s:g} % nominal strain")
+    f"stress_{name}": Column(
+        "Pa", f"axial stress at {100.0 * s:g} % nominal strain, in tension at minus that"
+    )
     for name, s in STRAINS.items()
 }
 _DISSIPATION = {
@@ -323,7 +325,9 @@ _DISSIPATION = {
 }
 _RATE = {
     "strain_rate": Column("1/s", "mean rate of the nominal strain"),
-    "approach_velocity": Column("m/s", "mean velocity at which the platens approach"),
+    "approach_velocity": Column(
+        "m/s", "mean velocity at which the platens approach, negative in tension"
+    ),
 }
 
 
@@ -346,7 +350,7 @@ def _brittleness(run: Run, state: State) -> Values:
 def _stresses(run: Run, state: State) -> Values:
     curve = stress_strain(run)
     return {
-        f"stress_{name}": _or(curve.at(strain), "the run does not reach this strain")
+        f"stress_{name}": _or(curve.at(curve.toward(strain)), "the run does not reach this strain")
         for name, strain in STRAINS.items()
     }
 
