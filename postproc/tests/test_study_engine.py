@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import math
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -142,6 +143,7 @@ def finding(values: dict[str, str], found: str, *holds: str) -> Finding:
     return Finding(
         title="Title",
         paper="Paper",
+        claim="",
         found=found,
         note="Note",
         values={name: Expression(text) for name, text in values.items()},
@@ -165,6 +167,7 @@ def test_a_finding_compares_numbers_of_the_table() -> None:
     assert evaluate(one, ROWS).model_dump() == {
         "title": "Title",
         "paper": "Paper",
+        "claim": "",
         "found": "3.0 and 5, [3.0, 2.0, 5.0]",
         "verdict": "agrees",
         "note": "Note",
@@ -189,6 +192,18 @@ def test_the_verdict_follows_from_the_tests(holds: list[str], verdict: str) -> N
     found = evaluate(finding({"w": "val('w', series='a', m=1)"}, "{w}", *holds), ROWS)
     assert found.verdict == verdict
     assert found.found.startswith("no result: " if verdict == "no result" else "3.0")
+
+
+def test_what_goes_beyond_the_paper_holds_or_not() -> None:
+    for holds, word in (
+        (["w > 2"], "holds"), (["w > 2", "w > 4"], "holds in part"), (["w > 4"], "does not hold"),
+        (["max(col('n')) > 1"], "no result"),
+    ):  # fmt: skip
+        one = finding({"w": "val('w', series='a', m=1)"}, "{w}", *holds)
+        found = evaluate(replace(one, paper="", claim="It is so."), ROWS)
+        assert found.verdict == word
+        assert found.statement == "Beyond the paper: It is so."
+    assert evaluate(one, ROWS).statement == "Paper"
 
 
 def test_numbers_that_are_missing_are_no_result() -> None:
