@@ -9,6 +9,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from perigeo_post.read.errors import RequestError
@@ -127,6 +128,11 @@ def test_columns_are_joined_run_by_run() -> None:
     assert table_value("sorted(w)", w=width) == [2.0, 5.0, 6.0]
     assert table_value("abs(-w)[0]", w=width) == 2.0
     assert table_value("slope([1, 2, 3], [2, 4, 6])") == pytest.approx(2.0)
+    assert table_value("deviation(w)", w=width) == pytest.approx(np.std([2, 6, 5], ddof=1))
+    error = table_value("standard_error(w)", w=width)
+    assert error == pytest.approx(np.std([2, 6, 5], ddof=1) / np.sqrt(3))
+    with pytest.raises(MissingValueError, match="two values"):
+        table_value("standard_error(w)", w=Numbers({"a": 2.0}))
     assert table_value("slope(d, w)", w=width, d=Numbers({"a": 0.0, "c": 2.0})) == 1.5
     with pytest.raises(MissingValueError, match="no run in common"):
         table_value("w / d", w=width, d=Numbers({"x": 1.0}))
