@@ -155,8 +155,8 @@ def _frame(
     platens: bool,
 ) -> None:
     group = file.create_group(key)
-    group.attrs["step"] = np.int32(0 if fields is None else round(1e5 * strain))
-    group.attrs["time"] = 0.0 if fields is None else 200.0 * strain
+    group.attrs["step"] = np.int32(0 if fields is None else round(1e5 * abs(strain)))
+    group.attrs["time"] = 0.0 if fields is None else 200.0 * abs(strain)
     group.attrs["strain"] = strain if platens else float("nan")
     group.attrs["valid"] = np.int32(valid)
     group.attrs["written"] = np.int32(fields is not None)

@@ -286,9 +286,12 @@ def test_page_holds_findings_values_runs_and_checks(results: Path) -> None:
 def test_verdicts_are_counted(results: Path) -> None:
     finding = json.loads((results / "fig3a" / "study.json").read_text())["findings"][0]
     verdicts = ("agrees", "agrees in part", "differs", "differs", "no result")
-    change(results / "fig3a", findings=[finding | {"verdict": v} for v in verdicts])
+    beyond = {"paper": "", "claim": "It is blue.", "verdict": "does not hold"}
+    findings = [finding | {"verdict": v} for v in verdicts] + [finding | beyond]
+    change(results / "fig3a", findings=findings)
     text = page_of(results).text
-    assert "agrees2agrees in part1differs2no result1" in text.replace(" ", "").replace(
+    assert text.count("Beyond the paper: It is blue.") == 2
+    assert "agrees2agrees in part1differs2doesnothold1no result1" in text.replace(" ", "").replace(
         "agreesinpart", "agrees in part"
     ).replace("noresult", "no result")
 

@@ -5,9 +5,11 @@ from __future__ import annotations
 import io
 import math
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from perigeo_post.read.errors import RequestError
@@ -126,6 +128,11 @@ def test_columns_are_joined_run_by_run() -> None:
     assert table_value("sorted(w)", w=width) == [2.0, 5.0, 6.0]
     assert table_value("abs(-w)[0]", w=width) == 2.0
     assert table_value("slope([1, 2, 3], [2, 4, 6])") == pytest.approx(2.0)
+    assert table_value("deviation(w)", w=width) == pytest.approx(np.std([2, 6, 5], ddof=1))
+    error = table_value("standard_error(w)", w=width)
+    assert error == pytest.approx(np.std([2, 6, 5], ddof=1) / np.sqrt(3))
+    with pytest.raises(MissingValueError, match="two values"):
+        table_value("standard_error(w)", w=Numbers({"a": 2.0}))
     assert table_value("slope(d, w)", w=width, d=Numbers({"a": 0.0, "c": 2.0})) == 1.5
     with pytest.raises(MissingValueError, match="no run in common"):
         table_value("w / d", w=width, d=Numbers({"x": 1.0}))
@@ -142,6 +149,7 @@ def finding(values: dict[str, str], found: str, *holds: str) -> Finding:
     return Finding(
         title="Title",
         paper="Paper",
+        claim="",
         found=found,
         note="Note",
         values={name: Expression(text) for name, text in values.items()},
@@ -165,6 +173,7 @@ def test_a_finding_compares_numbers_of_the_table() -> None:
     assert evaluate(one, ROWS).model_dump() == {
         "title": "Title",
         "paper": "Paper",
+        "claim": "",
         "found": "3.0 and 5, [3.0, 2.0, 5.0]",
         "verdict": "agrees",
         "note": "Note",
@@ -189,6 +198,18 @@ def test_the_verdict_follows_from_the_tests(holds: list[str], verdict: str) -> N
     found = evaluate(finding({"w": "val('w', series='a', m=1)"}, "{w}", *holds), ROWS)
     assert found.verdict == verdict
     assert found.found.startswith("no result: " if verdict == "no result" else "3.0")
+
+
+def test_what_goes_beyond_the_paper_holds_or_not() -> None:
+    for holds, word in (
+        (["w > 2"], "holds"), (["w > 2", "w > 4"], "holds in part"), (["w > 4"], "does not hold"),
+        (["max(col('n')) > 1"], "no result"),
+    ):  # fmt: skip
+        one = finding({"w": "val('w', series='a', m=1)"}, "{w}", *holds)
+        found = evaluate(replace(one, paper="", claim="It is so."), ROWS)
+        assert found.verdict == word
+        assert found.statement == "Beyond the paper: It is so."
+    assert evaluate(one, ROWS).statement == "Paper"
 
 
 def test_numbers_that_are_missing_are_no_result() -> None:

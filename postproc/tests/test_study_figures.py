@@ -89,6 +89,10 @@ def test_a_plot_has_bars_units_and_a_line_for_each_series(runs: list[StudyRun]) 
     assert [row["uncertainty"] for row in bars.rows] == [0.04, 0.02]
     low, high = bars.figure.axes[0].containers[0][2][0].get_segments()[0][:, 1]
     assert (low, high) == pytest.approx((0.16, 0.24))
+    for run in runs:
+        run.row["width_spread"] = run.row.pop("width_uncertainty")
+    spread = plot(runs, {"x": "m", "y": "width"}, COLUMNS)
+    assert [row["uncertainty"] for row in spread.rows] == [0.04, 0.02]
 
 
 def test_several_columns_have_colours_and_series_have_dashes(runs: list[StudyRun]) -> None:
@@ -271,8 +275,8 @@ def test_panels_do_not_overlap(runs: list[StudyRun]) -> None:
 def test_profiles_carry_widths_and_can_be_centred(runs: list[StudyRun]) -> None:
     drawing = profiles(runs, {"centred": True}, COLUMNS)
     ax = drawing.figure.axes[0]
-    assert ax.get_legend().get_title().get_text() == "width at 10 % of the peak"
-    width = MEASURES["band"].take(runs[0].run, AT)["width"]
+    assert ax.get_legend().get_title().get_text() == "width between points at 10 %"
+    width = MEASURES["band"].take(runs[0].run, AT)["width_interpolated"]
     assert ax.get_legend().get_texts()[0].get_text() == f"m = 1: {width:.3f} m"
     top = ax.lines[0].get_xdata()[np.argmax(ax.lines[0].get_ydata())]
     assert top == pytest.approx(0.0)

@@ -301,6 +301,8 @@ FINDING = '[[finding]]\ntitle = "F"\nfound = "{a}"\n'
         (SWEPT + FINDING + "values = { a = '1' }\nholds = 'c > 0'\n",
          "line 11, finding 1, holds: 'c > 0': unknown name c"),
         (SWEPT + FINDING + "values = { a = '1' }\n", "holds: a finding needs a test"),
+        (SWEPT + FINDING + "paper = 'P'\nclaim = 'C'\nvalues = { a = '1' }\nholds = 'a > 0'\n",
+         "claim: stands beside paper: a finding is about the paper or goes beyond it"),
     ],
 )  # fmt: skip
 def test_mistakes_are_named_with_their_place(wrong: Any, text: str, found: str) -> None:

@@ -79,12 +79,16 @@ def test_the_moduli_that_a_run_has(result: Path) -> None:
 
 def test_the_band_and_its_pattern(result: Path) -> None:
     found = take(result, "band")
-    width, uncertainty = found["width"], found["width_uncertainty"]
-    assert width == pytest.approx(2 * 0.05 * np.sqrt(2 * np.log(10)), abs=0.03)
-    assert uncertainty == 0.04
-    assert found["width_over_horizon"] == pytest.approx(float(str(width)) / 0.12)
-    assert found["width_over_horizon_uncertainty"] == pytest.approx(0.04 / 0.12)
-    assert found["width_closed"] is True
+    true = 2 * 0.05 * np.sqrt(2 * np.log(10))
+    for name, error in (("width", 0.01), ("width_interpolated", 0.03)):
+        assert found[name] == pytest.approx(true, abs=error)
+        assert found[f"{name}_over_horizon"] == pytest.approx(float(str(found[name])) / 0.12)
+    assert found["width_over_spacing"] == pytest.approx(float(str(found["width"])) / 0.04)
+    assert 0.0 < float(str(found["width_spread"])) < 0.01
+    assert found["width_interpolated_uncertainty"] == 0.04
+    assert found["width_interpolated_over_horizon_uncertainty"] == pytest.approx(0.04 / 0.12)
+    assert found["width_interpolated_closed"] is True
+    assert found["width_interpolated_median"] == pytest.approx(true, abs=0.03)
     assert (found["direction"], found["pattern"]) == ("rising", "X")
     assert found["band_ratio"] == pytest.approx(0.5, abs=0.03)
     assert found["profile_mirrored"] is False

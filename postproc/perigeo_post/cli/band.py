@@ -63,19 +63,29 @@ def carry_out(args: Arguments) -> None:
     draw_figure(args, args.files[0], "band", draw)
 
 
+def _fitted_text(m: BandMeasure) -> str:
+    fitted = m.widths[0]
+    if not fitted.places:
+        return "unknown: no profile could be fitted along the band"
+    return (
+        f"{fitted.width:.4f} m, median of fits at {fitted.places} places along the band; half the "
+        f"distance of the quartiles {fitted.spread:.2g} m"
+    )
+
+
 def _band_text(m: BandMeasure) -> str:
-    w, b = m.width, m.bands
+    w, b = m.interpolated, m.bands
     (x0, y0), (x1, y1) = m.profile.line
     state = f"strain {m.strain:.6g}" if np.isfinite(m.strain) else f"time {m.time:.6g} s"
     more = "" if w.closed else " at least (the line ends before the level is reached)"
     lines = [
         f"{m.label} at {state}",
-        f"  width {w.width:.4f} m +- {w.uncertainty:.3g} m{more}, at {100 * w.level:g} % of the "
-        f"peak {w.peak:.4g}",
+        f"  width at {100 * w.level:g} % of the peak {_fitted_text(m)}",
+        f"  between points {w.width:.4f} m +- {w.uncertainty:.3g} m{more}, peak {w.peak:.4g},",
         f"  on the line ({x0:.4g}, {y0:.4g}) to ({x1:.4g}, {y1:.4g}) m, peak at "
         f"({w.peak_position[0]:.4g}, {w.peak_position[1]:.4g}) m",
-        f"  {m.width_normal:.4f} m at right angles to the band; median along the band "
-        f"{b.prevailing.width_median:.4f} m +- {b.prevailing.width_spread:.2g} m",
+        f"  {m.interpolated_normal:.4f} m at right angles to the band; median along the band "
+        f"{b.prevailing.width_interpolated:.4f} m",
     ]
     for band in (b.prevailing, b.other):
         if band is not None:

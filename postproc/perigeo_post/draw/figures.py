@@ -84,12 +84,12 @@ def _mark(ax: Axes, curve: Curve, marks: Sequence[float]) -> None:
     factor, _ = prefix_for(
         float(np.nanmax(np.abs(curve.y))) if np.isfinite(curve.y).any() else 0.0, curve.y_unit
     )
-    sign = -1.0 if curve.tension_positive else 1.0
     for strain in marks:
-        y = curve.at(sign * strain) * factor
-        ax.plot([100.0 * sign * strain], [y], "o", color="black", zorder=5)
+        x = curve.toward(strain)
+        y = curve.at(x) * factor
+        ax.plot([100.0 * x], [y], "o", color="black", zorder=5)
         ax.annotate(
-            f"{100.0 * strain:g} %", (100.0 * sign * strain, y), xytext=(0, 5),
+            f"{100.0 * strain:g} %", (100.0 * x, y), xytext=(0, 5),
             textcoords="offset points", fontsize=7, ha="center",
         )  # fmt: skip
 
@@ -144,7 +144,7 @@ def column_figure(
 
 def draw_profile(ax: Axes, measure: BandMeasure) -> None:
     """A profile with its peak, level and width into given axes."""
-    profile, width = measure.profile, measure.width
+    profile, width = measure.profile, measure.interpolated
     ax.plot(profile.distance, profile.values, color=COLOURS[0])
     target = width.level * width.peak
     ax.axhline(target, color="0.5", linewidth=0.6, linestyle=":")
@@ -153,7 +153,8 @@ def draw_profile(ax: Axes, measure: BandMeasure) -> None:
     sign = "" if width.closed else "≥ "
     text = (
         f"width at {100.0 * width.level:g} % of the peak\n"
-        f"{sign}{width.width:.3f} m ± {width.uncertainty:.2g} m\n"
+        f"between points {sign}{width.width:.3f} m ± {width.uncertainty:.2g} m\n"
+        f"fitted along the band {measure.width:.3f} m\n"
         f"peak {width.peak:.3g}"
     )
     right = width.peak_distance < 0.5 * profile.distance[-1]
@@ -222,14 +223,15 @@ def profile_figure(measures: Sequence[BandMeasure], labels: Sequence[str] | None
         ax = figure.subplots()
         for k, (m, name) in enumerate(zip(measures, names)):
             ax.plot(
-                m.profile.distance - m.width.peak_distance, m.profile.values,
+                m.profile.distance - m.interpolated.peak_distance, m.profile.values,
                 color=COLOURS[k % len(COLOURS)], linestyle=DASHES[k % len(DASHES)],
-                label=f"{name}: {m.width.width:.3f} m",
+                label=f"{name}: {m.interpolated.width:.3f} m",
             )  # fmt: skip
         ax.set_xlabel("Distance from the peak along the line [m]")
         ax.set_ylabel(with_unit(label_of(first.name), first.unit))
         ax.set_ylim(bottom=0.0)
-        ax.legend(title=f"width at {100.0 * measures[0].width.level:g} % of the peak",
+        level = 100.0 * measures[0].interpolated.level
+        ax.legend(title=f"width between points at {level:g} % of the peak",
                   title_fontsize=7)  # fmt: skip
     return figure
 

@@ -3,8 +3,12 @@
 Definitions (the README of this package has them in words):
 
 * A *profile* is the equivalent plastic strain alpha along a straight line.
-* The *width* is the extent of the profile around its peak within which alpha is at least `level`
-  (10 %) of the peak; its uncertainty is one point spacing, half a spacing at each edge.
+* The *width* of a band is the extent across it within which alpha is at least `level` (10 %) of
+  the peak. It is the median over places along the band, at each of which a profile is fitted to
+  the points as averages over their cells (band_fit.py): this does not depend on the spacing.
+* The *interpolated width* is the paper's measure: the same extent on one profile, read between
+  the points by bilinear interpolation. It is too wide, by more the coarser the points; its
+  uncertainty is one point spacing, half a spacing at each edge.
 * Two *bands* are looked for, one in each diagonal direction: "rising" (the coordinate across the
   specimen grows with the one along the loading axis) and "falling". The ridge of a band is where
   profiles across it have their peak; a straight line fitted to it gives the angle and place.
@@ -51,7 +55,7 @@ class Profile:
 
 @dataclass(frozen=True)
 class Width:
-    """Extent of a profile round its peak."""
+    """Extent of a profile round its peak, between points: the interpolated width."""
 
     width: float  # [m]; NaN where the profile has no peak
     left: float  # distances of the two edges from the start of the line [m]
@@ -62,6 +66,16 @@ class Width:
     level: float
     uncertainty: float  # [m]
     closed: bool  # False: the profile ends before it falls below the level, width is a lower bound
+
+
+@dataclass(frozen=True)
+class FittedWidth:
+    """The width of a band from fits at places along it, at right angles to it."""
+
+    width: float  # median [m]; NaN where there is no place to fit
+    spread: float  # half the distance between the quartiles [m]
+    places: int
+    level: float  # part of the peak
 
 
 @dataclass(frozen=True)
@@ -78,8 +92,7 @@ class Band:
     ridge_max: float  # largest of them
     ridge_position: tuple[float, float]  # where that is
     probe: tuple[float, float]  # where the profile across the band is taken
-    width_median: float  # median width at the level over the same places, normal to the band [m]
-    width_spread: float  # half the distance between the quartiles of those widths [m]
+    width_interpolated: float  # median of the widths between points over the same places [m]
     ridge_distance: FloatArray = field(repr=False)  # (k) along the line from its first end [m]
     ridge_x: FloatArray = field(repr=False)
     ridge_y: FloatArray = field(repr=False)
@@ -129,7 +142,7 @@ def profile_width(
     level: float = LEVEL,
     near: tuple[tuple[float, float], float] | None = None,
 ) -> Width:
-    """Width of a profile at `level` of its peak, the edges interpolated linearly.
+    """Interpolated width of a profile at `level` of its peak.
 
     With `near`, a place and a distance [m], the peak is the largest value within this distance of
     the place; a line that crosses several bands may be higher elsewhere.
@@ -230,17 +243,23 @@ class BandMeasure:
     time: float
     strain: float
     profile: Profile
-    width: Width
+    interpolated: Width
     bands: BandSystem
+    widths: tuple[FittedWidth, ...]  # of the prevailing band, and of the other where there is one
     spacing: float
     horizon: float
     largest: float  # largest alpha of the body
 
     @property
-    def width_normal(self) -> float:
-        """The width at right angles to the prevailing band [m]."""
+    def width(self) -> float:
+        """The width of the prevailing band, at right angles to it [m]."""
+        return self.widths[0].width
+
+    @property
+    def interpolated_normal(self) -> float:
+        """The interpolated width, turned from the line to right angles to the band [m]."""
         angle = crossing_angle(self.profile.line, self.bands.prevailing.line)
-        return self.width.width * float(np.sin(np.radians(angle)))
+        return self.interpolated.width * float(np.sin(np.radians(angle)))
 
     def as_dict(self) -> dict[str, Any]:
         """The numbers, with the names of ``perigeo-post band --json``."""
@@ -250,16 +269,18 @@ class BandMeasure:
             "frame": self.frame,
             "time": self.time,
             "strain": self.strain,
-            "width": self.width.width,
-            "width_uncertainty": self.width.uncertainty,
-            "width_closed": self.width.closed,
-            "width_normal": self.width_normal,
-            "width_median": strong.width_median,
-            "width_spread": strong.width_spread,
-            "level": self.width.level,
-            "peak": self.width.peak,
-            "position": list(self.width.peak_position),
-            "position_on_line": self.width.peak_distance,
+            "width": self.width,
+            "width_spread": self.widths[0].spread,
+            "width_places": self.widths[0].places,
+            "width_interpolated": self.interpolated.width,
+            "width_interpolated_uncertainty": self.interpolated.uncertainty,
+            "width_interpolated_closed": self.interpolated.closed,
+            "width_interpolated_normal": self.interpolated_normal,
+            "width_interpolated_median": strong.width_interpolated,
+            "level": self.interpolated.level,
+            "peak": self.interpolated.peak,
+            "position": list(self.interpolated.peak_position),
+            "position_on_line": self.interpolated.peak_distance,
             "line": [list(end) for end in self.profile.line],
             "angle": strong.angle,
             "angle_uncertainty": strong.angle_uncertainty,
@@ -277,9 +298,8 @@ class BandMeasure:
     def table(self) -> list[dict[str, Any]]:
         """One row for each band, the prevailing one first."""
         rows = []
-        for band in (self.bands.prevailing, self.bands.other):
-            if band is None:
-                continue
+        bands = [b for b in (self.bands.prevailing, self.bands.other) if b is not None]
+        for band, fitted in zip(bands, self.widths):
             rows.append(
                 {
                     "direction": band.direction,
@@ -294,8 +314,9 @@ class BandMeasure:
                     "ridge_max": band.ridge_max,
                     "ridge_x": band.ridge_position[0],
                     "ridge_y": band.ridge_position[1],
-                    "width_median": band.width_median,
-                    "width_spread": band.width_spread,
+                    "width": fitted.width,
+                    "width_spread": fitted.spread,
+                    "width_interpolated": band.width_interpolated,
                 }
             )
         return rows

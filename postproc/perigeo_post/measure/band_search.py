@@ -309,7 +309,6 @@ def _band(work: _Field, line: _Axis, ridge: _Ridge, crossing: FloatArray | None)
     x, y = (place[1], place[0]) if work.swap else (place[0], place[1])
     top = int(np.flatnonzero(used)[peaks.argmax()]) if len(peaks) else 0
     probe = _probe(line, ridge, used, crossing)
-    quartiles = np.percentile(widths, [25, 75]) if len(widths) else np.array([np.nan, np.nan])
     fitted = np.ptp(ridge.station[used]) if len(peaks) > 1 else length
     return Band(
         direction="rising" if line.sign > 0 else "falling",
@@ -322,8 +321,7 @@ def _band(work: _Field, line: _Axis, ridge: _Ridge, crossing: FloatArray | None)
         ridge_max=float(peaks.max()) if len(peaks) else 0.0,
         ridge_position=(float(x[top]), float(y[top])),
         probe=(float(x[probe]), float(y[probe])),
-        width_median=float(np.median(widths)) if len(widths) else float("nan"),
-        width_spread=float(0.5 * (quartiles[1] - quartiles[0])),
+        width_interpolated=float(np.median(widths)) if len(widths) else float("nan"),
         ridge_distance=ridge.station - ridge.station[0],
         ridge_x=x,
         ridge_y=y,

@@ -28,6 +28,18 @@ class Curve:
     y_unit: str
     tension_positive: bool = False
 
+    def toward(self, strain: float) -> float:
+        """The x of a strain that is given without a sign: in the direction of loading.
+
+        That is the side of 0 on which the curve goes farther, so that 1 % means 1 % of tension
+        in a test in tension. A strain below 0 is taken as it is, compression positive.
+        """
+        turned = -1.0 if self.tension_positive else 1.0
+        if strain < 0.0 or len(self.x) == 0:
+            return turned * strain
+        back = np.nanmax(-turned * self.x) > np.nanmax(turned * self.x)
+        return -turned * strain if back else turned * strain
+
     def at(self, x: float) -> float:
         """y where the curve first reaches x, linearly interpolated; NaN where it never does."""
         ahead = self.x - x
@@ -184,8 +196,7 @@ def curve_numbers(
         "platen": platen,
         "width": run.width,
     }
-    sign = -1.0 if tension_positive else 1.0
-    numbers["stress_at"] = {f"{s:g}": curve.at(sign * s) for s in strains}
+    numbers["stress_at"] = {f"{s:g}": curve.at(curve.toward(s)) for s in strains}
     numbers.update(modulus_numbers(run))
     return numbers
 

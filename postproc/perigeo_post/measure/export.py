@@ -17,8 +17,8 @@ from .curves import Curve
 
 TABLE_UNITS = {
     "angle": "degrees", "x0": "m", "y0": "m", "x1": "m", "y1": "m", "length": "m",
-    "ridge_x": "m", "ridge_y": "m", "width_median": "m", "width_spread": "m", "strength": "1",
-    "ridge_max": "1", "strain": "1", "time": "s", "width": "m", "width_uncertainty": "m",
+    "ridge_x": "m", "ridge_y": "m", "width_interpolated": "m", "width_spread": "m", "strength": "1",
+    "ridge_max": "1", "strain": "1", "time": "s", "width": "m",
     "peak_stress": "Pa", "strain_at_peak": "1", "largest_plastic_strain": "1",
     "apparent_modulus": "Pa",
 }  # fmt: skip

@@ -20,6 +20,7 @@ from .band import (
     profile_along,
     profile_width,
 )
+from .band_fit import fitted_width
 from .band_search import find_bands, search_scale
 from .curves import curve_numbers, modulus_numbers, peak, stress_strain
 
@@ -74,18 +75,21 @@ def measure_band(
         )
         near = (bands.prevailing.probe, 1.5 * search_scale(run.body_points, run.horizon))
     profile = frame_profile(frame, line)
-    width = profile_width(profile, run.body_points.spacing, level, near)
+    extent = profile_width(profile, run.body_points.spacing, level, near)
+    alpha = frame["plastic_strain"][run.body]
+    there = [band for band in (bands.prevailing, bands.other) if band is not None]
     return BandMeasure(
         label=run.name,
         frame=frame.number,
         time=frame.time,
         strain=frame.strain,
         profile=profile,
-        width=width,
+        interpolated=extent,
         bands=bands,
+        widths=tuple(fitted_width(run.body_points, alpha, b, run.horizon, level) for b in there),
         spacing=run.body_points.spacing,
         horizon=run.horizon,
-        largest=float(frame["plastic_strain"][run.body].max()),
+        largest=float(alpha.max()),
     )
 
 
@@ -121,9 +125,8 @@ def compare_runs(
         if run.platens is not None:
             curve = stress_strain(run, tension_positive)
             row["peak_stress"], row["strain_at_peak"] = peak(curve)
-            sign = -1.0 if tension_positive else 1.0
             for s in strains:
-                row[f"stress_at_{s:g}"] = curve.at(sign * s)
+                row[f"stress_at_{s:g}"] = curve.at(curve.toward(s))
             row["apparent_modulus"] = modulus_numbers(run)["apparent_modulus"]
         for s in strains:
             try:

@@ -59,15 +59,19 @@ def pattern_of(frame: Frame) -> Pattern:
 
 
 def earlier_frame(frame: Frame) -> Frame | None:
-    """The last frame before this one with less strain by 0.05 %, if it has at least half of it."""
+    """The last frame before this one with less strain by 0.05 %, if it has at least half of it.
+
+    In tension, where strains are negative, as in compression.
+    """
+    way = -1.0 if frame.strain < 0.0 else 1.0
     there = [
         other
         for other in frame.run.frames()
         if other.number is not None
         and frame.number is not None
         and other.number < frame.number
-        and other.strain <= frame.strain - LEAST_STEP
-        and other.strain >= LEAST_PART * frame.strain
+        and way * other.strain <= way * frame.strain - LEAST_STEP
+        and way * other.strain >= LEAST_PART * way * frame.strain
     ]
     return there[-1] if there else None
 

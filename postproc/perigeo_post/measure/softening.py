@@ -23,7 +23,7 @@ class Softening:
     strain_upper: float  # where the stress has fallen to UPPER of the peak
     strain_lower: float  # to LOWER
     slope: float  # [Pa] fall of stress over strain between the two, positive
-    displacement: float  # [m] approach of the platens between the two
+    displacement: float  # [m] motion of the platens between the two, positive in tension too
 
 
 def softening_branch(run: Run) -> Softening:
@@ -35,8 +35,8 @@ def softening_branch(run: Run) -> Softening:
     start = int(np.nanargmax(np.abs(curve.y)))
     upper = _first_below(curve.x[start:], curve.y[start:] / top, UPPER)
     lower = _first_below(curve.x[start:], curve.y[start:] / top, LOWER)
-    way = lower - upper
-    slope = (UPPER - LOWER) * top / way if way > 0.0 else float("nan")
+    way = (lower - upper) * (-1.0 if at < 0.0 else 1.0)  # in tension strains are negative
+    slope = (UPPER - LOWER) * abs(top) / way if way > 0.0 else float("nan")
     return Softening(top, at, upper, lower, slope, way * run.length)
 
 

@@ -313,6 +313,8 @@ class Run:
     ) -> Frame:
         """The frame nearest to a strain or time, or of a number; the last where none is given.
 
+        In a test in tension, where strains are negative, 1 % means 1 % of tension.
+
         `tolerance`: largest distance allowed, by default 2 % of what is asked for (at least
         2e-4 in strain, and a hundredth of the time of the last frame).
         """
@@ -332,6 +334,8 @@ class Run:
         wanted = strain if strain is not None else time
         assert wanted is not None
         there = np.array([f.strain if strain is not None else f.time for f in frames])
+        if strain is not None and strain > 0.0 and not (there > 0.0).any():
+            there = -there
         if tolerance is None:
             last = float(np.nanmax(np.abs(there))) if len(there) else 0.0
             tolerance = max(0.02 * abs(wanted), 2e-4 if strain is not None else 0.01 * last)

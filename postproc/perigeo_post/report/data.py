@@ -16,6 +16,9 @@ from ..study.record import (
     DIFFERS,
     DONE,
     FAILED,
+    HOLDS,
+    HOLDS_IN_PART,
+    HOLDS_NOT,
     IN_PART,
     MISSING,
     NO_RESULT,
@@ -37,7 +40,8 @@ else:
 
 # What the pages need of a study stands in its record.
 __all__ = [
-    "AGREES", "DIFFERS", "DONE", "FAILED", "IN_PART", "MISSING", "NO_RESULT", "VERDICTS",
+    "AGREES", "DIFFERS", "DONE", "FAILED", "HOLDS", "HOLDS_IN_PART", "HOLDS_NOT", "IN_PART",
+    "MISSING", "NO_RESULT", "VERDICTS",
     "CheckRow", "FigureRecord", "Finding", "Material", "RunRecord", "Study", "gather",
     "known_studies", "rank", "read_checks", "read_table",
 ]  # fmt: skip

@@ -8,13 +8,25 @@ from collections.abc import Callable
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
-from .data import AGREES, DIFFERS, DONE, FAILED, IN_PART, MISSING, NO_RESULT
+from .data import (
+    AGREES,
+    DIFFERS,
+    DONE,
+    FAILED,
+    HOLDS,
+    HOLDS_IN_PART,
+    HOLDS_NOT,
+    IN_PART,
+    MISSING,
+    NO_RESULT,
+)
 from .study import machine_text
 from .values import DASH, cell, duration, number, plural, readable
 
 # How words are marked: the class of the style sheet.
 MARKS = {
     AGREES: "agrees", IN_PART: "in-part", DIFFERS: "differs", NO_RESULT: "no-result",
+    HOLDS: "agrees", HOLDS_IN_PART: "in-part", HOLDS_NOT: "differs",
     DONE: "agrees", FAILED: "differs", MISSING: "no-result", "ok": "agrees", "FAILED": "differs",
 }  # fmt: skip
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -27,7 +28,7 @@ def page_html(material: Material) -> tuple[str, list[str]]:
         for s in studies for run in s.runs if run.status == FAILED
     }  # fmt: skip
     problems = [*material.problems, *(words for one in sections for words in one.problems)]
-    findings = [finding for study in studies for finding in study.findings]
+    counts = Counter(finding.verdict for study in studies for finding in study.findings)
     runs = {state: sum(s.count(state) for s in studies) for state in (DONE, FAILED, MISSING)}
     template = environment().get_template("page.html")
     text = template.render(
@@ -37,7 +38,7 @@ def page_html(material: Material) -> tuple[str, list[str]]:
         failures=failures,
         problems=problems,
         origin=origin(material),
-        verdicts=[(v, sum(f.verdict == v for f in findings)) for v in VERDICTS if findings],
+        verdicts=[(v, counts[v]) for v in VERDICTS if counts[v]],
         runs=runs,
         lacking=[f"{n} {state}" for state, n in runs.items() if state != DONE and n],
         seconds=sum(study.seconds or 0.0 for study in studies),

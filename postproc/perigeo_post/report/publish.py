@@ -41,7 +41,7 @@ def tables(material: Material) -> str:
     """All tables: what the paper says and what is found, then the values of every study."""
     lines = [provenance(material), ""]
     rows = [
-        list(map(markdown_cell, (study.title, f.title, f.paper, f.found, f.verdict)))
+        list(map(markdown_cell, (study.title, f.title, f.statement, f.found, f.verdict)))
         for study in material.studies
         for f in study.findings
     ]

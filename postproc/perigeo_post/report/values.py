@@ -14,7 +14,9 @@ DASH = "–"
 # What the page shows at first sight and the documents print, where a study has it.
 HEADLINE = (
     "modulus_platen", "modulus_gauge", "modulus_mean", "peak_stress", "strain_at_peak",
-    "stress_at_state", "largest_alpha", "width", "width_uncertainty", "width_over_horizon", "angle",
+    "stress_at_state", "largest_alpha", "width", "width_spread",
+    "width_over_horizon", "width_interpolated", "width_interpolated_uncertainty",
+    "width_interpolated_over_horizon", "angle",
     "band_ratio", "pattern", "softening_slope", "brittleness", "dissipated_energy",
     "yield_stress_variation", "kinetic_ratio_largest", "reaction_gap_largest",
     "energy_error_largest",

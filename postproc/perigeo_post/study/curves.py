@@ -48,7 +48,7 @@ def curves(
     with style():
         figure, ax, place = _curve_axes(styled, options)
         factor, unit = _draw_curves(ax, styled, options)
-        _mark(ax, styled, marks, factor, turned)
+        _mark(ax, styled, marks, factor)
         note = f", {sense} positive"
         ax.set_xlabel(draw.text(options, "x_label") or f"Nominal strain{note} [%]")
         ax.set_ylabel(draw.text(options, "y_label") or with_unit(f"Axial stress{note}", unit))
@@ -157,16 +157,14 @@ def _x_factor(curve: Curve) -> float:
     return 100.0 if curve.x_name == "strain" else 1.0
 
 
-def _mark(
-    ax: Axes, styled: Sequence[_Styled], marks: Sequence[float], factor: float, turned: bool
-) -> None:
+def _mark(ax: Axes, styled: Sequence[_Styled], marks: Sequence[float], factor: float) -> None:
     """Symbols on every curve at these strains; the strain is written at a single curve."""
-    sign = -1.0 if turned else 1.0
     if len(styled) == 1 and marks:
         ax.margins(x=0.08)
     for s in styled:
         for strain in marks:
-            x, y = sign * strain, s.curve.at(sign * strain) * factor
+            x = s.curve.toward(strain)
+            y = s.curve.at(x) * factor
             ax.plot([100.0 * x], [y], "o", color=s.look.colour, markeredgecolor="black",
                     markeredgewidth=0.5, zorder=5)  # fmt: skip
             if len(styled) == 1:

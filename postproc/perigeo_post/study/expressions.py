@@ -180,6 +180,18 @@ def _slope(x: Any, y: Any) -> float:
     return float(above / sum((a - mean_x) ** 2 for a, _ in both))
 
 
+def _deviation(values: list[Any]) -> float:
+    """Standard deviation of a sample."""
+    if len(values) < 2:
+        raise MissingValueError("a standard deviation or error needs two values")
+    return float(statistics.stdev(values))
+
+
+def _standard_error(values: list[Any]) -> float:
+    """Standard error of the mean of a sample."""
+    return _deviation(values) / math.sqrt(len(values))
+
+
 FUNCTIONS: dict[str, Callable[..., Any]] = {
     "abs": _each(abs),
     "ceil": _each(math.ceil),
@@ -200,12 +212,14 @@ TABLE_FUNCTIONS: dict[str, Callable[..., Any]] = {
     **FUNCTIONS,
     "all": _some(all),
     "any": _some(any),
+    "deviation": _some(_deviation),
     "len": lambda value: len(_listed(value)),
     "mean": _some(statistics.fmean),
     "median": _some(statistics.median),
     "ratio": _some(_ratio),
     "slope": _slope,
     "sorted": lambda value: sorted(_listed(value)),
+    "standard_error": _some(_standard_error),
     "sum": _some(sum),
 }
 CONSTANTS: dict[str, Any] = {"pi": math.pi}

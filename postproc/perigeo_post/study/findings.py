@@ -19,7 +19,17 @@ from .expressions import (
     nearest,
 )
 from .plan import PlannedRun
-from .record import AGREES, DIFFERS, IN_PART, NO_RESULT, FindingRecord, Verdict
+from .record import (
+    AGREES,
+    DIFFERS,
+    HOLDS,
+    HOLDS_IN_PART,
+    HOLDS_NOT,
+    IN_PART,
+    NO_RESULT,
+    FindingRecord,
+    Verdict,
+)
 from .tables import FindingTable
 from .toml import Key, Problems
 from .types import Column, Value
@@ -33,6 +43,7 @@ class Finding:
 
     title: str
     paper: str
+    claim: str
     found: str
     note: str
     values: dict[str, Expression]
@@ -109,6 +120,9 @@ def checked_finding(
     """A [[finding]] of the study file; None where it is not right."""
     before = len(problems.list)
     names: list[str] = []
+    if table.paper and table.claim:
+        what = "stands beside paper: a finding is about the paper or goes beyond it"
+        problems.add((*place, "claim"), what)
     for name, expression in table.values.items():
         _check((*place, "values", name), expression, names, known, problems)
         names.append(name)
@@ -126,6 +140,7 @@ def checked_finding(
     return Finding(
         title=table.title,
         paper=table.paper,
+        claim=table.claim,
         found=table.found,
         note=table.note,
         values=dict(table.values),
@@ -197,19 +212,24 @@ def evaluate(finding: Finding, rows: Sequence[TableRow]) -> FindingRecord:
     return FindingRecord(
         title=finding.title,
         paper=finding.paper,
+        claim=finding.claim,
         found=found,
-        verdict=NO_RESULT if missing else verdict([bool(truth) for _, truth in tests]),
+        verdict=NO_RESULT
+        if missing
+        else verdict([bool(truth) for _, truth in tests], beyond=not finding.paper),
         note=finding.note,
         values=plain({name: _listed(value) for name, value in values.items()}),
         holds=tests,
     )
 
 
-def verdict(tests: Sequence[bool]) -> Verdict:
-    """In one word or three."""
+def verdict(tests: Sequence[bool], beyond: bool = False) -> Verdict:
+    """In one word or three; what goes `beyond` the paper cannot agree with it."""
     if all(tests):
-        return AGREES
-    return IN_PART if any(tests) else DIFFERS
+        return HOLDS if beyond else AGREES
+    if any(tests):
+        return HOLDS_IN_PART if beyond else IN_PART
+    return HOLDS_NOT if beyond else DIFFERS
 
 
 def _truth(value: Any) -> bool | None:

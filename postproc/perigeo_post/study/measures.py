@@ -158,14 +158,17 @@ def _modulus(name: str) -> Part:
 # ---- band ----------------------------------------------------------------------------------
 
 _BAND = {
-    "width": Column("m", "width of the band at 10 % of its peak, along the line of the profile"),
-    "width_uncertainty": Column("m", "half a spacing at each edge"),
-    "width_closed": Column("1", "false: the profile ends before 10 %, the width is a lower bound"),
+    "width": Column("m", "width of the band at 10 % of its peak: median of fits along the band"),
+    "width_spread": Column("m", "half the distance of the quartiles of those fits"),
     "width_over_horizon": Column("1", "width over horizon"),
-    "width_over_horizon_uncertainty": Column("1", "width_uncertainty over horizon"),
+    "width_over_horizon_spread": Column("1", "width_spread over horizon"),
     "width_over_spacing": Column("1", "width over spacing"),
-    "width_median": Column("m", "median width along the band, at right angles to it"),
-    "width_spread": Column("m", "half the distance of the quartiles of those widths"),
+    "width_interpolated": Column("m", "width between points along the line of the profile"),
+    "width_interpolated_uncertainty": Column("m", "half a spacing at each edge"),
+    "width_interpolated_closed": Column("1", "false: the profile ends before 10 %, a lower bound"),
+    "width_interpolated_over_horizon": Column("1", "width_interpolated over horizon"),
+    "width_interpolated_over_horizon_uncertainty": Column("1", "its uncertainty over horizon"),
+    "width_interpolated_median": Column("m", "median of such widths along and across the band"),
     "peak_alpha": Column("1", "peak of the profile"),
     "angle": Column("degrees", "angle between the prevailing band and the loading axis"),
     "angle_uncertainty": Column("degrees", "one spacing over the length fitted"),
@@ -207,17 +210,21 @@ def band_at(run: Run, state: State, level: float = LEVEL) -> tuple[BandMeasure, 
 
 def _band(run: Run, state: State) -> Values:
     found, mirrored = band_at(run, state)
-    width, strong = found.width, found.bands.prevailing
+    fitted, read, strong = found.widths[0], found.interpolated, found.bands.prevailing
+    none = "no profile could be fitted along the band"
     return {
-        "width": width.width,
-        "width_uncertainty": width.uncertainty,
-        "width_closed": width.closed,
-        "width_over_horizon": width.width / found.horizon,
-        "width_over_horizon_uncertainty": width.uncertainty / found.horizon,
-        "width_over_spacing": width.width / found.spacing,
-        "width_median": strong.width_median,
-        "width_spread": strong.width_spread,
-        "peak_alpha": width.peak,
+        "width": _or(fitted.width, none),
+        "width_spread": _or(fitted.spread, none),
+        "width_over_horizon": _or(fitted.width / found.horizon, none),
+        "width_over_horizon_spread": _or(fitted.spread / found.horizon, none),
+        "width_over_spacing": _or(fitted.width / found.spacing, none),
+        "width_interpolated": read.width,
+        "width_interpolated_uncertainty": read.uncertainty,
+        "width_interpolated_closed": read.closed,
+        "width_interpolated_over_horizon": read.width / found.horizon,
+        "width_interpolated_over_horizon_uncertainty": read.uncertainty / found.horizon,
+        "width_interpolated_median": strong.width_interpolated,
+        "peak_alpha": read.peak,
         "angle": strong.angle,
         "angle_uncertainty": strong.angle_uncertainty,
         "direction": strong.direction,
@@ -298,7 +305,7 @@ _BRANCH = {
     "strain_at_90": Column("1", "nominal strain where the stress has fallen to 90 % of its peak"),
     "strain_at_50": Column("1", "nominal strain where it has fallen to 50 %"),
     "softening_slope": Column("Pa", "fall of stress over strain between 90 and 50 % of the peak"),
-    "softening_displacement": Column("m", "approach of the platens between 90 and 50 %"),
+    "softening_displacement": Column("m", "motion of the platens between 90 and 50 %"),
 }
 _BRITTLENESS = {
     "brittleness": Column("1", "softening_slope over the elastic slope"),
@@ -307,7 +314,9 @@ _STRESS_RATIO = {
     "stress_ratio": Column("1", "axial stress at the state over its peak"),
 }
 _STRESSES = {
-    f"stress_{name}": Column("Pa", f"axial stress at {100.0 * s:g} % nominal strain")
+    f"stress_{name}": Column(
+        "Pa", f"axial stress at {100.0 * s:g} % nominal strain, in tension at minus that"
+    )
     for name, s in STRAINS.items()
 }
 _DISSIPATION = {
@@ -316,7 +325,9 @@ _DISSIPATION = {
 }
 _RATE = {
     "strain_rate": Column("1/s", "mean rate of the nominal strain"),
-    "approach_velocity": Column("m/s", "mean velocity at which the platens approach"),
+    "approach_velocity": Column(
+        "m/s", "mean velocity at which the platens approach, negative in tension"
+    ),
 }
 
 
@@ -339,7 +350,7 @@ def _brittleness(run: Run, state: State) -> Values:
 def _stresses(run: Run, state: State) -> Values:
     curve = stress_strain(run)
     return {
-        f"stress_{name}": _or(curve.at(strain), "the run does not reach this strain")
+        f"stress_{name}": _or(curve.at(curve.toward(strain)), "the run does not reach this strain")
         for name, strain in STRAINS.items()
     }
 
@@ -397,7 +408,7 @@ def _field(run: Run, state: State) -> Values:
 def _field_in_band(run: Run, state: State) -> Values:
     values = _strength(run)
     alpha = frame_of(run, state)["plastic_strain"][run.body]
-    inside = alpha > 0.5 * measure_band(run, number=frame_of(run, state).number).width.peak
+    inside = alpha > 0.5 * measure_band(run, number=frame_of(run, state).number).interpolated.peak
     return {
         "yield_stress_band": float(
             np.average(values[inside], weights=run.volumes[run.body][inside])

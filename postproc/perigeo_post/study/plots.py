@@ -46,7 +46,7 @@ def plot(
     """One or several columns (`y`) over a parameter or column (`x`), a line for each series.
 
     Text on the x axis (names of cases) makes an axis of names. A column `<y>_uncertainty`
-    becomes error bars.
+    or `<y>_spread` becomes error bars.
     """
     runs = draw.selected(runs, options)
     x, ys = draw.text(options, "x"), draw.texts(options, "y")
@@ -164,7 +164,8 @@ def _points(
     points = []
     for run in runs:
         x, y = (draw.value_of(run, name) for name in what)
-        error = draw.value_of(run, f"{what[1]}_uncertainty")
+        errors = (draw.value_of(run, f"{what[1]}_{name}") for name in ("uncertainty", "spread"))
+        error = next((e for e in errors if e is not None), None)
         place = names.index(draw.shown(x)) if names and x is not None else x
         if isinstance(place, (int, float)) and isinstance(y, (int, float)):
             size = float(error) if isinstance(error, (int, float)) else float("nan")

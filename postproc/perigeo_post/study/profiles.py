@@ -39,7 +39,7 @@ class _Curve:
 def profiles(
     runs: Sequence[StudyRun], options: Mapping[str, Any], columns: Mapping[str, Column]
 ) -> Drawing:
-    """The plastic strain along the line of each run, with its width at a part of its peak.
+    """The plastic strain along the line of each run, with its interpolated width.
 
     `line` = [[x, y], [x, y]]: along it (mirrored where it would run along the band, not across);
     else along that of the study, or across the prevailing band. `centred`: distance from the peak.
@@ -60,9 +60,9 @@ def profiles(
     with style():
         centred, share = draw.flag(options, "centred"), draw.flag(options, "normalised")
         labels = [_label(curve, several) for curve in there]
-        level = there[0].found.width.level
+        level = there[0].found.interpolated.level
         inside = 0 if share or centred else 4
-        title = draw.text(options, "legend_title", f"width at {100.0 * level:g} % of the peak")
+        title = draw.text(options, "legend_title", f"width between points at {100.0 * level:g} %")
         place = draw.legend_place({"legend_title": title, **options}, labels, inside)
         figure = new_figure(place.width, (draw.number(options, "height") or 74.0) + place.extra)
         ax = figure.subplots()
@@ -76,7 +76,7 @@ def profiles(
         if all(np.nanmin(curve.values) >= 0.0 for curve in there):
             ax.set_ylim(bottom=0.0)
         if centred:
-            reach = AROUND * max(curve.found.width.width for curve in there)
+            reach = AROUND * max(curve.found.interpolated.width for curve in there)
             ax.set_xlim(-reach, reach)
         else:
             ax.set_xlim(0.0, max(float(c.found.profile.distance[-1]) for c in there))
@@ -111,7 +111,7 @@ def _line(options: Mapping[str, Any]) -> Line | None:
 
 
 def _label(curve: _Curve, several: bool) -> str:
-    width = curve.found.width
+    width = curve.found.interpolated
     strain = f", {100.0 * curve.found.strain:.3g} %" if several else ""
     return f"{curve.run.label}{strain}: {'' if width.closed else '≥ '}{width.width:.3f} m"
 
@@ -119,8 +119,8 @@ def _label(curve: _Curve, several: bool) -> str:
 def _draw_profile(
     ax: Axes, curve: _Curve, look: draw.Look, label: str, options: Mapping[str, Any]
 ) -> None:
-    """A profile and, where it is the plastic strain, its width at the level."""
-    profile, width = curve.found.profile, curve.found.width
+    """A profile and, where it is the plastic strain, its interpolated width at the level."""
+    profile, width = curve.found.profile, curve.found.interpolated
     start = width.peak_distance if draw.flag(options, "centred") else 0.0
     plastic = draw.text(options, "field", "plastic_strain") == "plastic_strain"
     factor = 1.0
@@ -144,7 +144,8 @@ def _profile_rows(curve: _Curve, field: str) -> list[Row]:
     known: Row = {"series": run.series, "run": run.id, "label": run.label}
     known["strain [1]"] = found.strain
     names = ("distance [m]", "from_peak [m]", "x [m]", "y [m]", f"{field} [{curve.unit}]")
-    columns = (profile.distance, profile.distance - found.width.peak_distance, profile.x, profile.y)
+    from_peak = profile.distance - found.interpolated.peak_distance
+    columns = (profile.distance, from_peak, profile.x, profile.y)
     return [
         {**known, **dict(zip(names, map(float, values)))}
         for values in zip(*columns, curve.values)

@@ -34,9 +34,12 @@ FILE = "study.json"
 SCHEMA: Literal["perigeo study"] = "perigeo study"
 SCHEMA_VERSION: Literal[1] = 1
 
-Verdict = Literal["agrees", "agrees in part", "differs", "no result"]
+# The first three are about the paper, the next three about what goes beyond it.
+Verdict = Literal[
+    "agrees", "agrees in part", "differs", "holds", "holds in part", "does not hold", "no result"
+]
 VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
-AGREES, IN_PART, DIFFERS, NO_RESULT = VERDICTS
+AGREES, IN_PART, DIFFERS, HOLDS, HOLDS_IN_PART, HOLDS_NOT, NO_RESULT = VERDICTS
 State = Literal["done", "failed", "missing"]
 STATES: tuple[State, ...] = get_args(State)
 DONE, FAILED, MISSING = STATES
@@ -118,11 +121,17 @@ class FindingRecord(_Part):
 
     title: Needed
     paper: Text = ""
+    claim: Text = ""  # beyond the paper
     found: Text = ""
     verdict: Annotated[Verdict, due("one of " + ", ".join(VERDICTS))]
     note: Text = ""
     values: dict[str, Any] = {}
     holds: list[Test] = []  # criterion, whether it holds; None: no data
+
+    @property
+    def statement(self) -> str:
+        """What the tests are about: the words of the paper, or what goes beyond it."""
+        return self.paper or (f"Beyond the paper: {self.claim}" if self.claim else "")
 
 
 class StudyRecord(_Part):

@@ -236,7 +236,8 @@ def _tell(data: StudyRecord, jobs: Sequence[Job], folder: Path, progress: Progre
         say("  findings")
     for finding in data.findings:
         say(f"    {finding.verdict}: {finding.title}")
-        for name, text in (("paper", finding.paper), ("here", finding.found)):
+        says = (("paper", finding.paper), ("claim", finding.claim), ("here", finding.found))
+        for name, text in says:
             if text:
                 say(_wrapped(f"      {name:<6}", text))
     reasons = data.reasons()

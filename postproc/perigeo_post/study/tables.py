@@ -294,10 +294,11 @@ class FigureTable(FigureOptions):
 
 
 class FindingTable(_Table):
-    """A statement of the paper and what decides about it."""
+    """A statement of the paper, or a claim beyond it, and what decides about it."""
 
     title: Needed
     paper: Text = ""
+    claim: Text = ""
     values: dict[str, Formula] = {}
     found: Needed
     holds: Annotated[list[Formula], BeforeValidator(_listed), AfterValidator(_tests)] = Field(
