@@ -22,6 +22,7 @@ module pd_j2
   contains
     procedure, nopass :: remembers
     procedure :: stress_block
+    procedure :: heat_block
     procedure :: reduced
   end type j2_t
 
@@ -333,6 +334,28 @@ contains
       largest = max(largest, excess(b))
     end do
   end subroutine trial_block
+
+  !> Heat so far: eta : dE^p = sigma_y(alpha) dalpha, from 0 to alpha.
+  pure subroutine heat_block(self, first, lo, hi, points, heat)
+    class(j2_t), intent(in) :: self
+    integer,  intent(in) :: first, lo, hi
+    type(law_points_t), intent(in) :: points
+    real(wp), intent(inout), contiguous :: heat(:)   !! out: [J/m^3]; row 1 is row `first`
+    real(wp) :: hi_modulus, lowest, over_k, no_end, changing
+    integer  :: i
+
+    hi_modulus = self%isotropic_modulus
+    over_k = 0.0_wp
+    if (hi_modulus < 0.0_wp) over_k = -1.0_wp / hi_modulus
+    no_end = merge(0.0_wp, far, hi_modulus < 0.0_wp)
+    !$omp simd simdlen(8) private(lowest, changing)
+    do i = lo, hi
+      lowest = min(self%residual_strength, points%strength(i))
+      changing = min(points%history(i, alpha), (points%strength(i) - lowest) * over_k + no_end)
+      heat(i - first + 1) = (points%strength(i) + 0.5_wp * hi_modulus * changing) * changing &
+        + lowest * (points%history(i, alpha) - changing)
+    end do
+  end subroutine heat_block
 
   !> sigma_y(alpha): isotropic softening ends at the residual strength, hardening has no end. A
   !> point that is weaker than that from the start does not soften.

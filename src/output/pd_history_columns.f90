@@ -45,6 +45,9 @@ contains
       joined=total, part=strain_energy))
     call add(columns, column_t('plastic_dissipation', 'J/m', 'plastic work so far', &
       value=plastic_dissipation))
+    call add(columns, column_t('plastic_heat', 'J/m', 'heat of the plastic flow so far; what '// &
+      'is left of plastic_dissipation is energy of the back stress', joined=total, &
+      part=plastic_heat))
     call add(columns, column_t('damping_dissipation', 'J/m', 'work of the damping forces '// &
       'against the frame of the damping so far', value=damping_dissipation))
     call add(columns, column_t('stabilisation_energy', 'J/m', 'energy of the zero-energy '// &
@@ -152,6 +155,16 @@ contains
     call weigh(block%lo, block%hi, block%model%points%volume, terms)
     part = block_sum(terms)
   end function strain_energy
+
+  pure real(wp) function plastic_heat(block) result(part)
+    type(block_view_t), intent(in) :: block
+    real(wp) :: terms(n_block)
+
+    if (block%hi - block%lo + 1 < n_block) terms = 0.0_wp
+    call block%model%materials%heat_block(block%number, block%state%law_points_t, terms)
+    call weigh(block%lo, block%hi, block%model%points%volume, terms)
+    part = block_sum(terms)
+  end function plastic_heat
 
   !> V times the terms of rows lo to hi.
   pure subroutine weigh(lo, hi, volume, terms)
