@@ -17,8 +17,6 @@ module pd_sliding
     real(wp) :: hi         !! H_i [Pa]
     real(wp) :: strength   !! sigma_y1 [Pa]
     real(wp) :: radius     !! R1; where H_i < 0 it falls with sigma_y [Pa]
-  contains
-    procedure :: at
   end type bound_t
 
   !> a = sqrt(3/2) dev S and b = sqrt(3/2) beta before the rest, as scalars.
@@ -39,6 +37,7 @@ module pd_sliding
   !> |b - (b : n) n| / |b| below which the path counts as straight: the answer is then known.
   real(wp), parameter :: straight = 1.0e-12_wp
   real(wp), parameter :: root_3_2 = sqrt(1.5_wp), root_2_3 = sqrt(2.0_wp / 3.0_wp)
+  real(wp), parameter :: close = 1.0e-9_wp       !! the error after such a step is of its square
   integer,  parameter :: most_trials = 100   !! bisection alone needs 53
   real(wp), parameter :: least = 1.0e-30_wp      !! keeps quotients finite that are not used [Pa]
 
@@ -81,7 +80,7 @@ contains
     call solve(bound, plane, t, end)
     n = (a - t * b) / end%length
     da = end%da
-    beta = root_2_3 * min(1.0_wp, end%radius / max(end%distance, least)) &
+    beta = root_2_3 * min(1.0_wp, end%radius / end%distance) &
       * (b - bound%h * da * n)
   end subroutine slide
 
@@ -92,19 +91,24 @@ contains
     real(wp),      intent(out) :: t
     type(trial_t), intent(out) :: end
     real(wp) :: low, high, next
+    logical  :: last
     integer  :: k
 
     low = 0.0_wp
     high = 1.0_wp
     t = 1.0_wp
-    end = bound%at(plane, t)
+    end = at(bound, plane, t)
     if (end%excess <= 0.0_wp) return   ! but for round-off, the back stress was not going to leave
     do k = 1, most_trials
       next = t - end%excess / max(end%slope, least)
-      if (.not. (next > low .and. next < high)) next = 0.5_wp * (low + high)
-      if (abs(next - t) <= epsilon(1.0_wp)) return
+      last = abs(next - t) <= close * t
+      if (.not. (next >= low .and. next <= high)) then
+        next = 0.5_wp * (low + high)
+        last = high - low <= epsilon(1.0_wp) * high
+      end if
       t = next
-      end = bound%at(plane, t)
+      end = at(bound, plane, t)
+      if (last) return
       if (end%excess > 0.0_wp) high = t
       if (end%excess <= 0.0_wp) low = t
     end do
@@ -114,26 +118,26 @@ contains
   !>
   !>   n = (a - t b) / |a - t b|,  da = (|a - t b| - sigma_y1) / M,  da' = w / M
   !>   excess' = |b - h da n| + t h (w da' + da |b - (b . n) n|^2 / |a - t b|) / |b - h da n| - R'
-  elemental type(trial_t) function at(self, plane, t) result(trial)
-    class(bound_t), intent(in) :: self
-    type(plane_t),  intent(in) :: plane
-    real(wp),       intent(in) :: t
-    real(wp) :: modulus, bn, w, rate, shrinking, way
+  pure type(trial_t) function at(bound, plane, t) result(trial)
+    type(bound_t), intent(in) :: bound
+    type(plane_t), intent(in) :: plane
+    real(wp),      intent(in) :: t
+    real(wp) :: over_modulus, over_length, bn, w, rate, shrinking, way
 
-    shrinking = max(0.0_wp, -self%hi)
-    modulus = self%g3 + self%hi - self%h * t
+    shrinking = max(0.0_wp, -bound%hi)
+    over_modulus = 1.0_wp / (bound%g3 + bound%hi - bound%h * t)
     trial%length = sqrt(max(0.0_wp, plane%aa - 2.0_wp * t * plane%ab + t**2 * plane%bb))
-    trial%da = max(0.0_wp, (trial%length - self%strength) / modulus)
-    bn = (plane%ab - t * plane%bb) / max(trial%length, least)
-    way = self%h * trial%da
-    trial%distance = sqrt(max(0.0_wp, plane%bb + way * (way - 2.0_wp * bn)))
-    trial%radius = max(0.0_wp, self%radius - shrinking * trial%da)
+    over_length = 1.0_wp / max(trial%length, least)
+    trial%da = max(0.0_wp, (trial%length - bound%strength) * over_modulus)
+    bn = (plane%ab - t * plane%bb) * over_length
+    way = bound%h * trial%da
+    trial%distance = sqrt(max(least, plane%bb + way * (way - 2.0_wp * bn)))
+    trial%radius = max(0.0_wp, bound%radius - shrinking * trial%da)
     trial%excess = t * trial%distance - trial%radius
     w = way - bn
-    rate = w / modulus
-    trial%slope = trial%distance + shrinking * rate + t * self%h * (w * rate + trial%da &
-      * max(0.0_wp, plane%bb - bn**2) / max(trial%length, least)) &
-      / max(trial%distance, least)
+    rate = w * over_modulus
+    trial%slope = trial%distance + shrinking * rate + t * bound%h * (w * rate + trial%da &
+      * max(0.0_wp, plane%bb - bn**2) * over_length) / trial%distance
   end function at
 
 end module pd_sliding
