@@ -68,14 +68,17 @@ contains
     call visitor%real_key(key_t('kinematic_modulus', unit='Pa', default='0.0', &
       also='3 G + H_k + H_i > 0; where both are negative also 3 G + H_i + min(H_k, H_i) > 0', &
       meaning='slope of stress against plastic strain due to the back stress, H_k; negative: ' &
-      //'softening'), self%kinematic_modulus)
+      //'softening, which makes the material stronger backwards, up to 2 sigma_y - sigma_r: ' &
+      //'for loading that is not monotonic take isotropic_modulus'), self%kinematic_modulus)
     call visitor%real_key(key_t('isotropic_modulus', unit='Pa', default='0.0', &
       also='as kinematic_modulus', &
-      meaning='slope of the yield stress against plastic strain, H_i; negative: softening'), &
+      meaning='slope of the yield stress against plastic strain, H_i; negative: softening, the ' &
+      //'same in all directions'), &
       self%isotropic_modulus)
     call visitor%real_key(key_t('residual_strength', unit='Pa', range=not_negative, &
       also='at most yield_stress; needed for j2 with a negative modulus', &
-      meaning='strength at which softening stops, sigma_r; without effect on hardening'), &
+      meaning='strength at which softening stops, sigma_r, in every direction in which the ' &
+      //'material goes on flowing; without effect on hardening'), &
       self%residual_strength)
   end subroutine visit_material
 

@@ -21,12 +21,20 @@ contains
     if (size(boundaries) /= 2) return
     associate (a => boundaries(1), b => boundaries(2))
       if (a%contact == 'affine' .or. b%contact == 'affine') return
-      if (size(a%span) > 0 .or. size(b%span) > 0) return
+      if (on_part(a) .or. on_part(b)) return
       if (normal_axis(a%side) /= normal_axis(b%side)) return
       if (outward(a%side) < outward(b%side)) platens = [1, 2]
       if (outward(a%side) > outward(b%side)) platens = [2, 1]
     end associate
   end function platens_of
+
+  !> Whether a boundary stands on a part of its side.
+  pure logical function on_part(boundary)
+    type(boundary_input_t), intent(in) :: boundary
+
+    on_part = .false.
+    if (allocated(boundary%span)) on_part = size(boundary%span) > 0
+  end function on_part
 
   !> Whether there are platens one of which moves under a load: its motion is known only in the run.
   pure logical function platen_under_load(input) result(found)

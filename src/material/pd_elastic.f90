@@ -18,6 +18,7 @@ module pd_elastic
     procedure, nopass :: remembers
     procedure :: stress_block
     procedure :: energy_block
+    procedure :: heat_block
     procedure :: lame_constants
     procedure :: reduced
   end type elastic_t
@@ -95,6 +96,17 @@ contains
       end do
     end associate
   end subroutine energy_block
+
+  !> No flow (the law has no column for it), no heat.
+  pure subroutine heat_block(self, first, lo, hi, points, heat)
+    class(elastic_t), intent(in) :: self
+    integer,  intent(in) :: first, lo, hi
+    type(law_points_t), intent(in) :: points
+    real(wp), intent(inout), contiguous :: heat(:)   !! out: [J/m^3]; row 1 is row `first`
+
+    if (self%plastic_strain == 0 .and. size(points%stress, 1) >= hi) &
+      heat(lo - first + 1:hi - first + 1) = 0.0_wp
+  end subroutine heat_block
 
   !> Lame's constants.
   pure subroutine lame_constants(self, lambda, shear_modulus)

@@ -7,7 +7,7 @@ module pd_j2
   use pd_elastic, only: elastic_t, new_elastic
   use pd_kinds, only: n_block, wp
   use pd_law, only: flow_t, law_points_t, law_t
-  use pd_tensors, only: inner, norm
+  use pd_sliding, only: bound_t, slide
   use pd_yielding, only: alpha, gather_points, remembers, scatter_points, yielding_t
   implicit none
   private
@@ -22,6 +22,7 @@ module pd_j2
   contains
     procedure, nopass :: remembers
     procedure :: stress_block
+    procedure :: heat_block
     procedure :: reduced
   end type j2_t
 
@@ -64,7 +65,8 @@ contains
   !>   f = sqrt(3/2)|eta*| - sigma_y(alpha),  da = f / (3 G + H_k + H_i)
   !>
   !> in pieces, because softening stops at the residual strength: first both moduli as they are
-  !> up to the nearest bound, then what is left with the modulus that still acts.
+  !> up to the nearest bound, then what is left with the modulus that still acts, while a back
+  !> stress that has met its bound slides along it.
   !> Errors: none: every trial state has exactly one answer (3 G + H_k + H_i > 0, and with two
   !> negative moduli 3 G + H_i + min(H_k, H_i) > 0).
   pure subroutine return_to_surface(material, n, points)
@@ -73,35 +75,47 @@ contains
     type(yielding_t), intent(inout) :: points
     real(wp) :: flow(n_block, 4)   !! direction of the flow, of length 1
     real(wp) :: deviator_trial(n_block, 4), first(n_block), da(n_block), q(n_block)
-    real(wp) :: direction(4), beta(4), rest
     integer  :: i
 
     call flow_directions(n, points, deviator_trial, q, flow)
     call increments(material, n, points, q, flow, first, da)
     call move_back_stress(material, n, flow, first, da, points)
-    if (both_soften(material)) then
+    if (material%kinematic_modulus < 0.0_wp) then
       do i = 1, n
-        if (first(i) >= da(i)) cycle
-        direction = flow(i, :)
-        beta = points%back_stress(i, :)
-        call shrink_to_residual(material, &
-          q(i) - (3.0_wp * material%shear_modulus + material%kinematic_modulus) * first(i), &
-          strength_now(material, points%yield_stress(i), points%alpha(i) + first(i)), &
-          min(material%residual_strength, points%yield_stress(i)), direction, beta, rest)
-        flow(i, :) = direction
-        points%back_stress(i, :) = beta
-        da(i) = first(i) + rest
+        if (first(i) < da(i)) call end_on_bound(material, i, q(i), first(i), points, flow, da(i))
       end do
     end if
     call update_points(material, n, flow, deviator_trial, da, points)
   end subroutine return_to_surface
 
-  !> Whether both moduli are negative.
-  pure logical function both_soften(material)
-    class(j2_t), intent(in) :: material
+  !> The rest of the return of a point whose back stress has met its bound.
+  pure subroutine end_on_bound(material, i, q, first, points, flow, da)
+    class(j2_t),      intent(in)    :: material
+    integer,          intent(in)    :: i
+    real(wp),         intent(in)    :: q, first
+    type(yielding_t), intent(inout) :: points
+    real(wp),         intent(inout) :: flow(n_block, 4)
+    real(wp),         intent(inout) :: da   !! in: that of a straight path
+    type(bound_t) :: bound
+    real(wp) :: direction(4), beta(4), rest, residual
 
-    both_soften = material%kinematic_modulus < 0.0_wp .and. material%isotropic_modulus < 0.0_wp
-  end function both_soften
+    associate (g3 => 3.0_wp * material%shear_modulus, yield_stress => points%yield_stress(i))
+      residual = min(material%residual_strength, yield_stress)
+      bound%g3 = g3
+      bound%h = -material%kinematic_modulus
+      bound%hi = material%isotropic_modulus
+      bound%strength = strength_now(material, yield_stress, points%alpha(i) + first)
+      bound%radius = yield_stress - residual
+      if (bound%hi < 0.0_wp) bound%radius = max(0.0_wp, bound%strength - residual)
+      direction = flow(i, :)
+      beta = points%back_stress(i, :)
+      rest = da - first
+      call slide(bound, q - (g3 + material%kinematic_modulus) * first, direction, beta, rest)
+      da = da + (rest - (da - first))   ! a straight path keeps the bits of its da
+      flow(i, :) = direction
+      points%back_stress(i, :) = beta
+    end associate
+  end subroutine end_on_bound
 
   !> dev S*, q* = sqrt(3/2)|eta*| and eta* / |eta*|.
   pure subroutine flow_directions(n, points, s, q, flow)
@@ -131,8 +145,8 @@ contains
     end do
   end subroutine flow_directions
 
-  !> Plastic increments: `first` with both moduli as they are, `da` whole (where both moduli are
-  !> negative and first < da: without the rest, which `shrink_to_residual` finds).
+  !> Plastic increments: `first` with both moduli as they are, `da` whole, on a straight path (where
+  !> the back stress has met its bound and slides, `slide` finds the rest).
   !>
   !> `first` ends where sigma_y(alpha) meets sigma_r, or where the back stress b - h da n, with
   !> b = sqrt(3/2) beta and h = -H_k, meets its bound r - k da, k = -H_i, r = sigma_y - sigma_r
@@ -158,7 +172,7 @@ contains
     residual = material%residual_strength
     floor_strength = merge(residual, -huge(1.0_wp), k > 0.0_wp)
     modulus = g3 + material%kinematic_modulus + hi
-    modulus_left = g3 + merge(material%kinematic_modulus, hi, k > 0.0_wp)
+    modulus_left = g3 + merge(max(0.0_wp, material%kinematic_modulus), hi, k > 0.0_wp)
     square = h**2 - k**2
     one_over_k = 0.0_wp
     if (k > 0.0_wp) one_over_k = 1.0_wp / k
@@ -321,6 +335,28 @@ contains
     end do
   end subroutine trial_block
 
+  !> Heat so far: eta : dE^p = sigma_y(alpha) dalpha, from 0 to alpha.
+  pure subroutine heat_block(self, first, lo, hi, points, heat)
+    class(j2_t), intent(in) :: self
+    integer,  intent(in) :: first, lo, hi
+    type(law_points_t), intent(in) :: points
+    real(wp), intent(inout), contiguous :: heat(:)   !! out: [J/m^3]; row 1 is row `first`
+    real(wp) :: hi_modulus, lowest, over_k, no_end, changing
+    integer  :: i
+
+    hi_modulus = self%isotropic_modulus
+    over_k = 0.0_wp
+    if (hi_modulus < 0.0_wp) over_k = -1.0_wp / hi_modulus
+    no_end = merge(0.0_wp, far, hi_modulus < 0.0_wp)
+    !$omp simd simdlen(8) private(lowest, changing)
+    do i = lo, hi
+      lowest = min(self%residual_strength, points%strength(i))
+      changing = min(points%history(i, alpha), (points%strength(i) - lowest) * over_k + no_end)
+      heat(i - first + 1) = (points%strength(i) + 0.5_wp * hi_modulus * changing) * changing &
+        + lowest * (points%history(i, alpha) - changing)
+    end do
+  end subroutine heat_block
+
   !> sigma_y(alpha): isotropic softening ends at the residual strength, hardening has no end. A
   !> point that is weaker than that from the start does not soften.
   pure real(wp) function strength_now(material, yield_stress, alpha) result(strength)
@@ -331,52 +367,5 @@ contains
     if (material%isotropic_modulus < 0.0_wp) &
       strength = max(strength, min(material%residual_strength, yield_stress))
   end function strength_now
-
-  !> The rest of a return when both moduli are negative and the back stress has met its bound R.
-  !>
-  !> With b = sqrt(3/2) beta and e = sqrt(3/2) eta after da1: the back stress shrinks with its
-  !> bound, b <- b (1 - k da2 / R), k = |H_i|, which turns the flow direction e + (k da2 / R) b;
-  !> da2 solves |e + (k da2 / R) b| - 3 G da2 = sigma_y1 - k da2, a quadratic. When nothing is left
-  !> of b the strength is the residual one and da3 is the rest.
-  pure subroutine shrink_to_residual(material, q, strength, residual, n, beta, da)
-    class(j2_t), intent(in)    :: material
-    real(wp),   intent(in)    :: q         !! |e| = q* - (3 G + H_k) da1 [Pa]
-    real(wp),   intent(in)    :: strength  !! sigma_y1 = sigma_y(alpha + da1) [Pa]
-    real(wp),   intent(in)    :: residual  !! sigma_r, at most sigma_y0 [Pa]
-    real(wp),   intent(inout) :: n(4)      !! flow direction, |n| = 1
-    real(wp),   intent(inout) :: beta(4)   !! back stress after da1, then at the end [Pa]
-    real(wp),   intent(out)   :: da        !! da2 + da3
-    real(wp) :: g3, k, r, b(4), e(4), square, linear, rest, root
-    logical  :: spent
-
-    g3 = 3.0_wp * material%shear_modulus
-    k = -material%isotropic_modulus
-    r = max(0.0_wp, strength - residual)
-    b = root_3_2 * beta
-    e = q * n
-    da = 0.0_wp
-    spent = r <= 0.0_wp
-    if (.not. spent) then
-      square = g3 * (g3 - 2.0_wp * k)
-      linear = strength * (g3 - k) - k * inner(e, b) / r
-      rest = strength**2 - q**2
-      root = sqrt(max(0.0_wp, linear**2 - square * rest))
-      if (linear > 0.0_wp) then
-        da = max(0.0_wp, -rest / (linear + root))
-      else
-        da = (root - linear) / square
-      end if
-      spent = da >= r / k
-      da = min(da, r / k)
-      e = e + (k * da / r) * b
-      n = e / norm(e)
-    end if
-    if (spent) then
-      beta = 0.0_wp
-      da = da + (norm(e) - g3 * da - residual) / g3
-    else
-      beta = beta * (1.0_wp - k * da / r)
-    end if
-  end subroutine shrink_to_residual
 
 end module pd_j2

@@ -37,6 +37,7 @@ module pd_law
     procedure(remembers_of), deferred, nopass :: remembers
     procedure(stress_of), deferred :: stress_block
     procedure(energy_of), deferred :: energy_block
+    procedure(heat_of), deferred :: heat_block
     procedure(moduli_of), deferred :: lame_constants
     procedure(reduced_of), deferred :: reduced
   end type law_t
@@ -64,6 +65,15 @@ module pd_law
       type(law_points_t), intent(in) :: points
       real(wp),     intent(inout), contiguous :: energy(:)   !! [J/m^3]; row 1: row `first`
     end subroutine energy_of
+    !> Heat per volume that the flow has made so far, a function of what the points remember, of
+    !> rows lo to hi. What is left of the plastic work is energy of the back stress.
+    pure subroutine heat_of(self, first, lo, hi, points, heat)
+      import :: law_points_t, law_t, wp
+      class(law_t), intent(in) :: self
+      integer,      intent(in) :: first, lo, hi
+      type(law_points_t), intent(in) :: points
+      real(wp),     intent(inout), contiguous :: heat(:)     !! [J/m^3]; row 1: row `first`
+    end subroutine heat_of
     !> Constants of the elastic law without flow: for the stable step and the wave speed.
     pure subroutine moduli_of(self, lambda, shear_modulus)
       import :: law_t, wp

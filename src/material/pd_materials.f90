@@ -44,6 +44,7 @@ module pd_materials
     procedure :: first_piola_block
     procedure :: cauchy_block
     procedure :: energy_block
+    procedure :: heat_block
     procedure :: plastic_strain_block
     procedure :: density_block
     procedure :: is_used
@@ -172,6 +173,22 @@ contains
       end associate
     end do
   end subroutine energy_block
+
+  !> Heat per volume that the flow has made so far, of the rows of a block.
+  pure subroutine heat_block(self, block, points, heat)
+    class(materials_t), intent(in) :: self
+    integer,            intent(in) :: block
+    type(law_points_t), intent(in) :: points
+    real(wp), intent(inout) :: heat(n_block)   !! out: [J/m^3]
+    integer :: k
+
+    do k = self%first_run(block), self%first_run(block + 1) - 1
+      associate (run => self%runs(k))
+        call self%list(run%material)%law%heat_block( &
+          self%runs(self%first_run(block))%lo, run%lo, run%hi, points, heat)
+      end associate
+    end do
+  end subroutine heat_block
 
   !> Strain of the rows of a block.
   pure subroutine strain_block(self, block, h, strain)

@@ -54,6 +54,9 @@ contains
       'and of the moving frame of the damping so far', value=external_work))
     call add(columns, column_t('energy_error', '1', 'what the balance lacks, over the external '// &
       'work or the initial kinetic energy', value=energy_error))
+    call add(columns, column_t('plastic_heat', 'J/m', 'heat of the plastic flow so far; what '// &
+      'is left of plastic_dissipation is energy of the back stress', joined=total, &
+      part=plastic_heat))
     call add(columns, column_t('min_det_f', '1', 'smallest det F, volume over that of the '// &
       'undeformed body,'//in_body, joined=smallest, part=det_f))
   end subroutine history_columns
@@ -176,6 +179,16 @@ contains
     call weigh(block%lo, block%hi, block%model%points%volume, terms)
     part = block_sum(terms)
   end function strain_energy
+
+  pure real(wp) function plastic_heat(block) result(part)
+    type(block_view_t), intent(in) :: block
+    real(wp) :: terms(n_block)
+
+    if (block%hi - block%lo + 1 < n_block) terms = 0.0_wp
+    call block%model%materials%heat_block(block%number, block%state%law_points_t, terms)
+    call weigh(block%lo, block%hi, block%model%points%volume, terms)
+    part = block_sum(terms)
+  end function plastic_heat
 
   !> V times the terms of rows lo to hi.
   pure subroutine weigh(lo, hi, volume, terms)

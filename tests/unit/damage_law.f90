@@ -22,6 +22,7 @@ module damage_law
     procedure, nopass :: remembers
     procedure :: stress_block
     procedure :: energy_block
+    procedure :: heat_block
     procedure :: lame_constants
     procedure :: reduced
   end type damage_t
@@ -84,6 +85,20 @@ contains
       end do
     end associate
   end subroutine energy_block
+
+  !> What was dissipated.
+  pure subroutine heat_block(self, first, lo, hi, points, heat)
+    class(damage_t), intent(in) :: self
+    integer,  intent(in) :: first, lo, hi
+    type(law_points_t), intent(in) :: points
+    real(wp), intent(inout), contiguous :: heat(:)
+    integer :: i
+
+    do i = lo, hi
+      heat(i - first + 1) = 0.5_wp * self%shear_modulus * self%threshold &
+        * max(0.0_wp, points%history(i, 1) - self%threshold)
+    end do
+  end subroutine heat_block
 
   pure subroutine lame_constants(self, lambda, shear_modulus)
     class(damage_t), intent(in)  :: self
