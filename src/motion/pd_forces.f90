@@ -5,8 +5,8 @@
 !> Each kernel finds what the one before it wrote for the same block still in the cache.
 !> Source: doc/theory.md, sections 2 to 5 and 7.
 module pd_forces
+  use pd_flow, only: flow_t
   use pd_kinds, only: n_block, wp
-  use pd_law, only: flow_t
   use pd_materials, only: materials_t
   use pd_model, only: model_t
   use pd_operators, only: operators_t
