@@ -299,12 +299,17 @@ contains
 
     if (is_damaged(group, 'factor')) return
     associate (s => input%stabilisation)
+      if (s%method /= 'relaxing') then
+        call add_useless(group, 'relaxing_stiffness', 'without method = ''relaxing''', errors)
+        call add_useless(group, 'relaxing_strain', 'without method = ''relaxing''', errors)
+      end if
       if (s%method == 'silling' .and. s%factor <= 0.0_wp) then
         call errors%add('the control has no strength', where=place_of(group, 'factor'), &
                         found=number_text(s%factor), allowed='> 0 for method = ''silling''')
-      else if (s%method == 'none' .and. s%factor > 0.0_wp) then
+      else if (s%method /= 'silling' .and. s%factor > 0.0_wp) then
         call errors%add('a strength without control', where=place_of(group, 'factor'), &
-                        found=number_text(s%factor), allowed='0 for method = ''none''')
+                        found=number_text(s%factor), &
+                        allowed='0 for method = '''//s%method//'''')
       end if
     end associate
   end subroutine check_stabilisation

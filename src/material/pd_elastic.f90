@@ -2,9 +2,10 @@
 !>
 !> Source: doc/theory.md, section 3.
 module pd_elastic
+  use pd_flow, only: flow_t
   use pd_kinds, only: n_block, wp
   use pd_labels, only: label_t
-  use pd_law, only: flow_t, law_points_t, law_t
+  use pd_law, only: law_points_t, law_t
   implicit none
   private
 

@@ -5,8 +5,9 @@
 !> chapter 3.
 module pd_j2
   use pd_elastic, only: elastic_t, new_elastic
+  use pd_flow, only: flow_t
   use pd_kinds, only: n_block, wp
-  use pd_law, only: flow_t, law_points_t, law_t
+  use pd_law, only: law_points_t, law_t
   use pd_sliding, only: bound_t, slide
   use pd_yielding, only: alpha, gather_points, remembers, scatter_points, yielding_t
   implicit none

@@ -7,9 +7,10 @@
 module pd_materials
   use pd_blocks, only: blocks_t
   use pd_elastic, only: isotropic_stress_block
+  use pd_flow, only: flow_t
   use pd_kinds, only: n_block, wp
   use pd_labels, only: label_t
-  use pd_law, only: flow_t, law_points_t, law_t
+  use pd_law, only: law_points_t, law_t
   use pd_measure, only: measure_t, n_kept, small_strain_block
   use pd_tensors, only: determinant
   implicit none

@@ -2,9 +2,10 @@
 !>
 !> Source: doc/theory.md, section 3.
 module pd_yielding
+  use pd_flow, only: flow_t
   use pd_kinds, only: n_block, wp
   use pd_labels, only: label_t
-  use pd_law, only: flow_t, law_points_t
+  use pd_law, only: law_points_t
   use pd_tensors, only: von_mises
   implicit none
   private

@@ -5,8 +5,8 @@
 !> Each kernel finds what the one before it wrote for the same block still in the cache.
 !> Source: doc/theory.md, sections 2 to 5 and 7.
 module pd_forces
+  use pd_flow, only: flow_t
   use pd_kinds, only: n_block, wp
-  use pd_law, only: flow_t
   use pd_materials, only: materials_t
   use pd_model, only: model_t
   use pd_operators, only: operators_t
@@ -91,6 +91,7 @@ contains
     lo = operators%domain%blocks%lo(block)
     hi = operators%domain%blocks%hi(block)
     work%dissipated(block) = 0.0_wp
+    work%relaxed(block) = 0.0_wp
     if (timed) work%times(1, block) = now()
     call operators%gradient_block(lo, hi, state%displacement, state%displacement_gradient)
     if (timed) work%times(2, block) = now()
@@ -98,6 +99,8 @@ contains
     if (work%failed(block) == 0) then
       call materials%stress_block(block, state%displacement_gradient, state%law_points_t, p, flow)
       work%dissipated(block) = flow%work(volume)
+      call operators%relax_block(block, state%displacement, state%displacement_gradient, flow, &
+        state%control_memory, p, work%relaxed(block))
       call operators%hand_over_block(lo, hi, state%displacement_gradient, p)
     end if
     if (timed) work%times(3, block) = now()
@@ -143,6 +146,7 @@ contains
       hi = operators%domain%blocks%hi(block)
       call operators%gradient_block(lo, hi, u, h)
       call materials%linear_stress_block(block, h, p)
+      call operators%hold_block(block, u, h, p)
       call operators%hand_over_block(lo, hi, h, p)
     end do
     !$omp end parallel do

@@ -16,10 +16,12 @@ module pd_ledger
     real(wp) :: largest_work = 0.0_wp                   !! largest |W| that was noted [J/m]
     real(wp) :: outer_work = 0.0_wp                     !! of supports and loads [J/m]
     real(wp), allocatable :: plastic(:)                 !! dissipated by flow (blocks) [J/m]
+    real(wp), allocatable :: control(:)                 !! dissipated by the relaxing control
     real(wp), allocatable :: damping(:)                 !! dissipated by damping (blocks) [J/m]
     real(wp), allocatable :: frame_work(:)              !! done by the damping's frame (blocks)
   contains
     procedure :: plastic_dissipation
+    procedure :: control_dissipation
     procedure :: damping_dissipation
     procedure :: external_work
     procedure :: note_work
@@ -32,8 +34,8 @@ contains
   pure type(ledger_t) function new_ledger(blocks) result(ledger)
     type(blocks_t), intent(in) :: blocks
 
-    allocate (ledger%plastic(blocks%count), ledger%damping(blocks%count), &
-      ledger%frame_work(blocks%count), source=0.0_wp)
+    allocate (ledger%plastic(blocks%count), ledger%control(blocks%count), &
+      ledger%damping(blocks%count), ledger%frame_work(blocks%count), source=0.0_wp)
   end function new_ledger
 
   !> Dissipated by plastic flow so far [J/m].
@@ -43,6 +45,14 @@ contains
 
     plastic_dissipation = blocks%total(self%plastic)
   end function plastic_dissipation
+
+  !> Dissipated by the relaxing control so far [J/m].
+  pure real(wp) function control_dissipation(self, blocks)
+    class(ledger_t), intent(in) :: self
+    type(blocks_t),  intent(in) :: blocks
+
+    control_dissipation = blocks%total(self%control)
+  end function control_dissipation
 
   !> Dissipated by the damping so far [J/m].
   pure real(wp) function damping_dissipation(self, blocks)
@@ -69,9 +79,11 @@ contains
     if (size(self%plastic) == blocks%count) return
     fitting = new_ledger(blocks)
     fitting%plastic(1) = sum(self%plastic)
+    fitting%control(1) = sum(self%control)
     fitting%damping(1) = sum(self%damping)
     fitting%frame_work(1) = sum(self%frame_work)
     self%plastic = fitting%plastic
+    self%control = fitting%control
     self%damping = fitting%damping
     self%frame_work = fitting%frame_work
   end subroutine fit

@@ -19,6 +19,7 @@ module pd_state
     real(wp), allocatable :: velocity(:, :)                !! v (n,2) [m/s]
     real(wp), allocatable :: force(:, :)                   !! force density f (n,2) [N/m^3]
     real(wp), allocatable :: displacement_gradient(:, :)   !! H = F - I (n,4) xx xy yx yy
+    real(wp), allocatable :: control_memory(:, :)          !! of the relaxing control (n,4) [m]
     type(label_t), allocatable :: remembered(:)            !! columns of the history
   contains
     procedure :: visit
@@ -32,6 +33,7 @@ module pd_state
   type :: block_work_t
     real(wp), allocatable :: damping(:, :)    !! work of the damping, see `pd_verlet` (4,blocks)
     real(wp), allocatable :: dissipated(:)    !! work of S on dE^p (blocks) [J/m]
+    real(wp), allocatable :: relaxed(:)       !! dissipated by the relaxing control (blocks) [J/m]
     integer,  allocatable :: failed(:)        !! first row with det F <= 0, 0: none (blocks)
     real(wp), allocatable :: times(:, :)      !! clock at the ends of kernels (3,blocks) [s]
   contains
@@ -47,10 +49,10 @@ contains
 
     if (allocated(self%failed)) then
       if (size(self%failed) == blocks%count) return
-      deallocate (self%damping, self%dissipated, self%failed, self%times)
+      deallocate (self%damping, self%dissipated, self%relaxed, self%failed, self%times)
     end if
     allocate (self%damping(4, blocks%count), self%dissipated(blocks%count), &
-      self%times(3, blocks%count), source=0.0_wp)
+      self%relaxed(blocks%count), self%times(3, blocks%count), source=0.0_wp)
     allocate (self%failed(blocks%count), source=0)
   end subroutine fit
 
@@ -67,6 +69,9 @@ contains
       'included', 'x y'), self%force)
     call visitor%field(state_field_t('displacement_gradient', '1', 'H = F - I', 'xx xy yx yy'), &
       self%displacement_gradient)
+    call visitor%field(state_field_t('control_memory', 'm', 'residual that the relaxing '// &
+      'control has let go, and that it holds, in the frame of the point', &
+      'gone_x gone_y held_x held_y'), self%control_memory)
     call visitor%field(state_field_t('stress', 'Pa', 'stress conjugate to the strain', tensor), &
       self%stress)
     call visitor%field(state_field_t('strength', 'Pa', 'initial strength', '', &

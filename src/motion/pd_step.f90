@@ -56,6 +56,7 @@ contains
       call timing%lap(kernel_boundaries)
       call forces(model, t_next, state, blocks, timing, failed_row)
       ledger%plastic = ledger%plastic + blocks%dissipated
+      ledger%control = ledger%control + blocks%relaxed
       ledger%outer_work = ledger%outer_work + (model%supports%work(state%velocity, t, t_next) &
         + model%loads%work(state%velocity, t, t_next))
       work%open = .not. whole

@@ -22,11 +22,14 @@ module pd_bond_list
     integer,     allocatable, private :: neighbour(:)  !! j (bonds)
     real(wp),    allocatable, private :: wx(:), wy(:)  !! omega V_j xi (bonds) [m^3]
     real(wp),    allocatable, private :: weight(:)     !! omega V_j (bonds) [m^2]
+    real(wp), allocatable, private :: residual_weight(:)   !! w~ (bonds) [m^2]
     real(wp),    allocatable, private :: position(:, :)  !! X (n,2) [m]
   contains
     procedure :: gradient_sums_block
     procedure :: divergence_sums_block
     procedure :: control_sums_block
+    procedure :: difference_sums_block
+    procedure :: weigh_residuals
     procedure :: shape_tensor
     procedure :: zero_energy_squared
     procedure :: bonds
@@ -239,6 +242,49 @@ contains
     end do
   end subroutine control_sums_block
 
+  !> S[x] of rows lo to hi: s = sum_j w~_ij (x_j - x_i).
+  pure subroutine difference_sums_block(self, lo, hi, x, s)
+    class(bond_list_t), intent(in) :: self
+    integer,  intent(in) :: lo, hi
+    real(wp), intent(in), contiguous :: x(:, :)   !! (n,2)
+    real(wp), intent(inout) :: s(n_block, 2)      !! out; row 1 is row lo
+    integer     :: i, j
+    integer(i8) :: b
+    real(wp)    :: sx, sy
+
+    do i = lo, hi
+      sx = 0.0_wp
+      sy = 0.0_wp
+      do b = self%first(i), self%first(i + 1) - 1
+        j = self%neighbour(b)
+        sx = sx + self%residual_weight(b) * (x(j, 1) - x(i, 1))
+        sy = sy + self%residual_weight(b) * (x(j, 2) - x(i, 2))
+      end do
+      s(i - lo + 1, 1) = sx
+      s(i - lo + 1, 2) = sy
+    end do
+  end subroutine difference_sums_block
+
+  !> w~ = omega V_j (1 - falloff |xi|^2) of all bonds.
+  subroutine weigh_residuals(self, falloff)
+    class(bond_list_t), intent(inout) :: self
+    real(wp),           intent(in)    :: falloff   !! [1/m^2]
+    integer     :: i, j
+    integer(i8) :: b
+
+    if (.not. allocated(self%residual_weight)) allocate (self%residual_weight(self%bonds()))
+    !$omp parallel do schedule(static) default(none) private(i, j, b) shared(self, falloff)
+    do i = 1, self%n
+      do b = self%first(i), self%first(i + 1) - 1
+        j = self%neighbour(b)
+        self%residual_weight(b) = self%weight(b) * (1.0_wp - falloff &
+          * ((self%position(j, 1) - self%position(i, 1))**2 &
+          + (self%position(j, 2) - self%position(i, 2))**2))
+      end do
+    end do
+    !$omp end parallel do
+  end subroutine weigh_residuals
+
   !> K = sum_j omega V_j xi (x) xi.
   subroutine shape_tensor(self, k)
     class(bond_list_t), intent(in) :: self
@@ -314,6 +360,8 @@ contains
 
     memory = real(self%bonds(), wp) * 28.0_wp + real(self%n, wp) * 32.0_wp
     if (allocated(self%control)) memory = memory + real(self%n, wp) * 8.0_wp
+    if (allocated(self%relaxing)) &
+      memory = memory + real(self%bonds(), wp) * 8.0_wp + real(self%n, wp) * 64.0_wp
   end function memory
 
 end module pd_bond_list

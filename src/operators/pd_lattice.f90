@@ -7,6 +7,7 @@
 !>   G[u]_i = sum_j omega V_0 u~_j (x) xi - u_i (x) s_i
 !>   D[A]_i = sum_j omega V_0 A~_j xi + A_i s_i
 !>   Z[u]_i = c_i sum_j omega V_0 u~_j + sum_j omega V_0 c_j u~_j - u_i sum_j omega V_j (c_i + c_j)
+!>   S[x]_i = sum_j omega V_0 (1 - a |xi|^2) x~_j - x_i sum_j omega V_j (1 - a |xi|^2)
 !>
 !> with u~ = u V / V_0, V_0 = dx^2 (the fields as weighed), and s_i = sum_j omega V_j xi, which
 !> differs from zero only where points are missing or have less than a whole cell. The inner loops
@@ -14,12 +15,13 @@
 !> Source: doc/theory.md, sections 2, 4 and 5.
 module pd_lattice
   use pd_blocks, only: blocks_t
-  use pd_columns, only: add_sums, columns_t, new_columns
+  use pd_columns, only: add_sums, columns_t, falling_off, sums_t
   use pd_domain, only: new_domain
-  use pd_families, only: horizon_t, influence, within_horizon
-  use pd_kinds, only: i8, n_block, n_line, wp
+  use pd_families, only: horizon_t, influence
+  use pd_kinds, only: i8, n_block, wp
+  use pd_offsets, only: columns_of, half_of_offsets
   use pd_operators, only: operators_t
-  use pd_storage, only: lattice_storage
+  use pd_storage, only: lattice_storage, line_start
   implicit none
   private
 
@@ -38,11 +40,16 @@ module pd_lattice
     real(wp), allocatable, private :: moment(:, :)        !! s (n,2) [m^3]
     real(wp), allocatable, private :: weighed_moment(:, :)   !! s over the share (n,2) [m^3]
     real(wp), allocatable, private :: stiffness(:)        !! sum_j omega V_j (c_i + c_j) (n) [N/m^4]
+    real(wp), private :: spacing = 0.0_wp                 !! dx [m]
+    type(sums_t), private :: residual(2)                  !! that make S together
+    real(wp), allocatable, private :: residual_weight(:)  !! of x~_i in S (n) [m^2]
   contains
     procedure :: set_control
     procedure :: gradient_sums_block
     procedure :: divergence_sums_block
     procedure :: control_sums_block
+    procedure :: difference_sums_block
+    procedure :: weigh_residuals
     procedure :: shape_tensor
     procedure :: zero_energy_squared
     procedure :: bonds
@@ -59,32 +66,15 @@ contains
     integer,         intent(in) :: place(:, :)   !! column and row of every point (n,2)
     real(wp),        intent(in) :: volume(:)     !! V of every point (n) [m^2]
     type(lattice_operators_t), intent(out) :: operators
-    integer  :: k, reach, kx, ky, i
-    real(wp) :: xi(2), length_squared
+    integer :: reach, i
 
+    operators%spacing = spacing
     operators%storage = lattice_storage(horizon, spacing, place)
     operators%n = operators%storage%rows
     reach = int(horizon%delta / spacing * (1.0_wp + 1.0e-5_wp)) + 1
-    allocate (operators%shift((2 * reach + 1)**2), source=0)
-    allocate (operators%xi(size(operators%shift), 2), operators%weight(size(operators%shift)), &
-      source=0.0_wp)
-    k = 0
-    do ky = 0, reach
-      do kx = -reach, reach
-        if (ky == 0 .and. kx <= 0) cycle
-        xi = spacing * real([kx, ky], wp)
-        length_squared = xi(1)**2 + xi(2)**2
-        if (.not. within_horizon(horizon, length_squared)) cycle
-        k = k + 1
-        operators%shift(k) = kx + ky * operators%storage%stride
-        operators%xi(k, :) = xi
-        operators%weight(k) = influence(horizon, length_squared) * spacing**2
-      end do
-    end do
-    operators%n_pairs = k
-    operators%shift = operators%shift(:k)
-    operators%xi = operators%xi(:k, :)
-    operators%weight = operators%weight(:k)
+    call half_of_offsets(horizon, spacing, operators%storage%stride, reach, operators%shift, &
+      operators%xi, operators%weight)
+    operators%n_pairs = size(operators%shift)
     operators%columns = columns_of(horizon, spacing, operators%storage%stride, reach)
     operators%own_weight = influence(horizon, 0.0_wp) * spacing**2
 
@@ -104,34 +94,6 @@ contains
       end do
     end if
   end subroutine new_lattice_operators
-
-  !> First row in the cache line of a row: blocks begin there.
-  pure integer function line_start(row)
-    integer, intent(in) :: row
-
-    line_start = n_line * ((row - 1) / n_line) + 1
-  end function line_start
-
-  !> The columns of the family of an inner point.
-  pure type(columns_t) function columns_of(horizon, spacing, stride, most) result(columns)
-    type(horizon_t), intent(in) :: horizon
-    real(wp),        intent(in) :: spacing
-    integer,         intent(in) :: stride, most   !! columns to look at
-    real(wp) :: weight(0:most, 0:most), length_squared
-    integer  :: k, r, reach
-
-    weight = 0.0_wp
-    reach = 0
-    do r = 0, most
-      do k = 0, most
-        length_squared = real(k**2 + r**2, wp) * spacing**2
-        if (.not. within_horizon(horizon, length_squared)) cycle
-        weight(k, r) = influence(horizon, length_squared) * spacing**2
-        reach = max(reach, k)
-      end do
-    end do
-    columns = new_columns(weight(:reach, :reach), spacing, stride)
-  end function columns_of
 
   !> W_i and s_i from the shares of the neighbours, and the numbers of bonds.
   subroutine weigh(operators)
@@ -331,6 +293,52 @@ contains
     end do
   end subroutine control_of_shares
 
+  !> S[x] of rows lo to hi from x~: s = sum_j w~_ij (x_j - x_i). Each sum contains the point itself;
+  !> these terms cancel.
+  pure subroutine difference_sums_block(self, lo, hi, x, s)
+    class(lattice_operators_t), intent(in) :: self
+    integer,  intent(in) :: lo, hi
+    real(wp), intent(in), contiguous :: x(:, :)   !! x~ (n,2)
+    real(wp), intent(inout) :: s(n_block, 2)      !! out; row 1 is row lo
+    integer :: i, k, n
+
+    n = hi - lo + 1
+    do k = 1, 2
+      !$omp simd simdlen(8)
+      do i = lo, hi
+        s(i - lo + 1, k) = -self%residual_weight(i) * x(i, k)
+      end do
+      call add_sums(self%columns, self%residual(1), lo, hi, x(:, k), s(:n, k))
+      call add_sums(self%columns, self%residual(2), lo, hi, x(:, k), s(:n, k))
+    end do
+  end subroutine difference_sums_block
+
+  !> Weights of S, and the factor of x~_i in it: the sums over the shares, over the own share.
+  subroutine weigh_residuals(self, falloff)
+    class(lattice_operators_t), intent(inout) :: self
+    real(wp), intent(in) :: falloff   !! a [1/m^2]
+    integer :: block, lo, hi, k
+
+    self%residual = falling_off(self%columns, falloff, self%spacing)
+    if (allocated(self%residual_weight)) deallocate (self%residual_weight)
+    allocate (self%residual_weight(self%n), source=0.0_wp)
+    !$omp parallel do schedule(static) default(none) shared(self) private(block, lo, hi, k)
+    do block = 1, self%domain%blocks%count
+      lo = self%domain%blocks%lo(block)
+      hi = self%domain%blocks%hi(block)
+      do k = 1, 2
+        call add_sums(self%columns, self%residual(k), lo, hi, self%share_of, &
+          self%residual_weight(lo:hi))
+      end do
+      where (self%share_of(lo:hi) > 0.0_wp)
+        self%residual_weight(lo:hi) = self%residual_weight(lo:hi) / self%share_of(lo:hi)
+      else where
+        self%residual_weight(lo:hi) = 0.0_wp
+      end where
+    end do
+    !$omp end parallel do
+  end subroutine weigh_residuals
+
   !> K = sum_j omega V_j xi (x) xi.
   subroutine shape_tensor(self, k)
     class(lattice_operators_t), intent(in) :: self
@@ -429,6 +437,7 @@ contains
     memory = real(self%n, wp) * 32.0_wp
     if (self%weighs) memory = memory + real(self%n, wp) * 32.0_wp
     if (allocated(self%control)) memory = memory + real(self%n, wp) * 32.0_wp
+    if (allocated(self%relaxing)) memory = memory + real(self%n, wp) * 72.0_wp
   end function memory
 
 end module pd_lattice

@@ -6,25 +6,32 @@
 !>
 !> H = F - I is handed out and the first Piola stress P taken in; f is minus the adjoint of H. A is
 !> the force tensor: the force state of a bond is omega A xi. c is the stiffness of the zero-energy
-!> control, whose affine part joins A.
+!> control, whose affine part joins A. The relaxing control is in `pd_relaxing`; its sums are
+!>
+!>   S[x]_i = sum_j w~_ij (x_j - x_i)    w~_ij = omega V_j (1 - falloff |xi|^2)
 !>
 !> In this order, once per state of u:
 !>
 !>   take_in(u)                          the sums can read u
 !>   gradient_block(lo, hi, u, h)        for every block
+!>   relax_block(block, u, h, ..., p)    for every block; the relaxing control joins P
 !>   hand_over_block(lo, hi, h, p)       for every block; takes P, keeps A
 !>   share()                             the sums can read A
 !>   force_block(lo, hi, u, f)           for every block
 !>
 !> Two realisations: `pd_bond_list` for any points, `pd_lattice` for bodies on a lattice. Set-up
-!> chooses; nothing else knows which it is. A realisation provides the sums G, D and Z. Where its
+!> chooses; nothing else knows which it is. A realisation provides the sums G, D, Z and S. Where its
 !> weights leave out the volume of the neighbour, the fields are multiplied by its share of a whole
 !> cell before they are summed.
 !> Source: doc/theory.md, sections 2, 4 and 5.
 module pd_operators
   use pd_blocks, only: blocks_t
   use pd_domain, only: domain_t
+  use pd_flow, only: flow_t
   use pd_kinds, only: block_sum, i8, n_block, pi, wp
+  use pd_operator_rows, only: mean_displacement, stress_times_k_inverse, subtract_affine_control, &
+    times_k_inverse
+  use pd_relaxing, only: relaxing_t, springs_t
   use pd_storage, only: storage_t
   implicit none
   private
@@ -39,6 +46,7 @@ module pd_operators
     real(wp), allocatable :: weight_sum(:)                !! W_i = sum_j omega V_j (n) [m^2]
     real(wp), allocatable :: k_inverse(:, :)              !! K^-1 (n,3) xx yy xy [1/m^4]
     real(wp), allocatable :: control(:)                   !! c (n) [N/m^6]; not allocated: none
+    type(relaxing_t), allocatable :: relaxing             !! not allocated: none
     real(wp), allocatable, private :: force_tensor(:, :)  !! A (n,4), weighed [N/m^6]
     logical :: weighs = .false.                           !! the sums read fields times the share
     real(wp), allocatable :: share_of(:)                  !! V over that of a whole cell (n)
@@ -47,16 +55,23 @@ module pd_operators
   contains
     procedure :: take_in
     procedure :: gradient_block
+    procedure :: relax_block
+    procedure :: hold_block
     procedure :: hand_over_block
     procedure :: share
     procedure :: force_block
     procedure :: set_control
     procedure :: control_energy
+    procedure :: set_relaxing
+    procedure :: relaxing_energy
+    procedure, private :: look_at_block
     procedure, private :: weigh_in
     procedure, private :: weigh_block
     procedure(gradient_of), deferred :: gradient_sums_block
     procedure(divergence_of), deferred :: divergence_sums_block
     procedure(control_of), deferred :: control_sums_block
+    procedure(differences_of), deferred :: difference_sums_block
+    procedure(residual_weights_of), deferred :: weigh_residuals
     procedure(shape_of), deferred :: shape_tensor
     procedure(zero_energy_of), deferred :: zero_energy_squared
     procedure(bonds_of), deferred :: bonds
@@ -89,6 +104,20 @@ module pd_operators
       real(wp), intent(in),    contiguous :: u(:, :)   !! (n,2) [m]
       real(wp), intent(inout), contiguous :: f(:, :)   !! (n,2) [N/m^3]
     end subroutine control_of
+    !> S[x] of rows lo to hi; row 1 of the sums is row lo.
+    pure subroutine differences_of(self, lo, hi, x, s)
+      import :: n_block, operators_t, wp
+      class(operators_t), intent(in) :: self
+      integer,  intent(in) :: lo, hi
+      real(wp), intent(in), contiguous :: x(:, :)   !! weighed (n,2)
+      real(wp), intent(inout) :: s(n_block, 2)      !! out
+    end subroutine differences_of
+    !> Weights of the sums S, from now on.
+    subroutine residual_weights_of(self, falloff)
+      import :: operators_t, wp
+      class(operators_t), intent(inout) :: self
+      real(wp), intent(in) :: falloff               !! [1/m^2]
+    end subroutine residual_weights_of
     !> K = sum_j omega V_j xi (x) xi; rows without a point: zero.
     subroutine shape_of(self, k)
       import :: operators_t, wp
@@ -188,31 +217,68 @@ contains
     call times_k_inverse(lo, hi, self%k_inverse, h)
   end subroutine gradient_block
 
-  !> H = G K^-1 of rows lo to hi, in the place of G.
-  pure subroutine times_k_inverse(lo, hi, k, h)
-    integer,  intent(in) :: lo, hi
-    real(wp), intent(in),    contiguous :: k(:, :)   !! K^-1 (n,3) xx yy xy [1/m^4]
-    real(wp), intent(inout), contiguous :: h(:, :)   !! G [m^4] -> H (n,4) xx xy yx yy
-    integer  :: i
-    real(wp) :: gxx, gxy, gyx, gyy
+  !> The relaxing control of a block: what it remembers goes from step n to n+1 as the points flow,
+  !> and it joins P.
+  pure subroutine relax_block(self, block, u, h, flow, memory, p, dissipated)
+    class(operators_t), intent(inout) :: self
+    integer,      intent(in) :: block
+    real(wp),     intent(in), contiguous :: u(:, :)           !! (n,2) [m]; as taken in
+    real(wp),     intent(in), contiguous :: h(:, :)           !! H (n,4) xx xy yx yy
+    type(flow_t), intent(in) :: flow                          !! of the block
+    real(wp),     intent(inout), contiguous :: memory(:, :)   !! of `pd_relaxing` (n,4) [m]
+    real(wp),     intent(inout) :: p(n_block, 4)              !! P xx xy yx yy [Pa]
+    real(wp),     intent(out)   :: dissipated                 !! by the control in this step [J/m]
+    type(springs_t) :: rows
+    integer :: lo, hi
 
-    !$omp simd simdlen(8) private(gxx, gxy, gyx, gyy)
-    do i = lo, hi
-      gxx = h(i, 1)
-      gxy = h(i, 2)
-      gyx = h(i, 3)
-      gyy = h(i, 4)
-      h(i, 1) = gxx * k(i, 1) + gxy * k(i, 3)
-      h(i, 2) = gxx * k(i, 3) + gxy * k(i, 2)
-      h(i, 3) = gyx * k(i, 1) + gyy * k(i, 3)
-      h(i, 4) = gyx * k(i, 3) + gyy * k(i, 2)
-    end do
-  end subroutine times_k_inverse
+    dissipated = 0.0_wp
+    if (.not. allocated(self%relaxing)) return
+    lo = self%domain%blocks%lo(block)
+    hi = self%domain%blocks%hi(block)
+    call self%look_at_block(block, u, h, rows)
+    call self%relaxing%relax_rows(lo, hi, flow, rows, memory, dissipated)
+    call self%relaxing%join_rows(lo, hi, rows, p)
+    call self%weigh_block(lo, hi, self%relaxing%pull)
+  end subroutine relax_block
+
+  !> The same for a small displacement of a body that has never flowed.
+  pure subroutine hold_block(self, block, u, h, p)
+    class(operators_t), intent(inout) :: self
+    integer,  intent(in) :: block
+    real(wp), intent(in), contiguous :: u(:, :)   !! (n,2) [m]; as taken in
+    real(wp), intent(in), contiguous :: h(:, :)   !! H (n,4) xx xy yx yy
+    real(wp), intent(inout) :: p(n_block, 4)      !! P xx xy yx yy [Pa]
+    type(springs_t) :: rows
+    integer :: lo, hi
+
+    if (.not. allocated(self%relaxing)) return
+    lo = self%domain%blocks%lo(block)
+    hi = self%domain%blocks%hi(block)
+    call self%look_at_block(block, u, h, rows)
+    call self%relaxing%hold_rows(lo, hi, rows)
+    call self%relaxing%join_rows(lo, hi, rows, p)
+    call self%weigh_block(lo, hi, self%relaxing%pull)
+  end subroutine hold_block
+
+  !> Residuals and frames of a block.
+  pure subroutine look_at_block(self, block, u, h, rows)
+    class(operators_t), intent(in) :: self
+    integer,  intent(in) :: block
+    real(wp), intent(in), contiguous :: u(:, :), h(:, :)
+    type(springs_t), intent(inout) :: rows
+    integer :: lo, hi
+
+    lo = self%domain%blocks%lo(block)
+    hi = self%domain%blocks%hi(block)
+    if (self%weighs) then
+      call self%difference_sums_block(lo, hi, self%weighed, rows%h)
+    else
+      call self%difference_sums_block(lo, hi, u, rows%h)
+    end if
+    call self%relaxing%look_at_rows(lo, hi, h, rows)
+  end subroutine look_at_block
 
   !> Take the first Piola stress of rows lo to hi, and keep A = P K^-1 - c H.
-  !>
-  !> This is where a control that follows the material gets, per block, what the law says of its
-  !> flow.
   pure subroutine hand_over_block(self, lo, hi, h, p)
     class(operators_t), intent(inout) :: self
     integer,  intent(in) :: lo, hi
@@ -225,46 +291,12 @@ contains
     call self%weigh_block(lo, hi, self%force_tensor)
   end subroutine hand_over_block
 
-  !> A = P K^-1 of rows lo to hi.
-  pure subroutine stress_times_k_inverse(lo, hi, k, p, a)
-    integer,  intent(in) :: lo, hi
-    real(wp), intent(in),    contiguous :: k(:, :)   !! K^-1 (n,3) xx yy xy [1/m^4]
-    real(wp), intent(in),    contiguous :: p(:, :)   !! P xx xy yx yy [Pa]; row 1 is row lo
-    real(wp), intent(inout), contiguous :: a(:, :)   !! out: A (n,4) xx xy yx yy [N/m^6]
-    integer :: i, b
-
-    !$omp simd simdlen(8) private(b)
-    do i = lo, hi
-      b = i - lo + 1
-      a(i, 1) = p(b, 1) * k(i, 1) + p(b, 2) * k(i, 3)
-      a(i, 2) = p(b, 1) * k(i, 3) + p(b, 2) * k(i, 2)
-      a(i, 3) = p(b, 3) * k(i, 1) + p(b, 4) * k(i, 3)
-      a(i, 4) = p(b, 3) * k(i, 3) + p(b, 4) * k(i, 2)
-    end do
-  end subroutine stress_times_k_inverse
-
-  !> A <- A - c H for rows lo to hi.
-  pure subroutine subtract_affine_control(lo, hi, c, h, a)
-    integer,  intent(in) :: lo, hi
-    real(wp), intent(in),    contiguous :: c(:)      !! (n) [N/m^6]
-    real(wp), intent(in),    contiguous :: h(:, :)   !! H (n,4) xx xy yx yy
-    real(wp), intent(inout), contiguous :: a(:, :)   !! A (n,4) xx xy yx yy [N/m^6]
-    integer :: i
-
-    !$omp simd simdlen(8)
-    do i = lo, hi
-      a(i, 1) = a(i, 1) - c(i) * h(i, 1)
-      a(i, 2) = a(i, 2) - c(i) * h(i, 2)
-      a(i, 3) = a(i, 3) - c(i) * h(i, 3)
-      a(i, 4) = a(i, 4) - c(i) * h(i, 4)
-    end do
-  end subroutine subtract_affine_control
-
   !> Make A readable for the sums, after the last block has been handed over.
   subroutine share(self)
     class(operators_t), intent(inout) :: self
 
     call self%domain%halo%exchange(self%force_tensor)
+    if (allocated(self%relaxing)) call self%domain%halo%exchange(self%relaxing%pull)
   end subroutine share
 
   !> Internal force density of rows lo to hi, the control included.
@@ -273,9 +305,13 @@ contains
     integer,  intent(in) :: lo, hi
     real(wp), intent(in),    contiguous :: u(:, :)   !! (n,2) [m]; as taken in
     real(wp), intent(inout), contiguous :: f(:, :)   !! out: (n,2) [N/m^3]
+    real(wp) :: sums(n_block, 2)
 
     call self%divergence_sums_block(lo, hi, self%force_tensor, f)
     if (allocated(self%control)) call self%control_sums_block(lo, hi, u, f)
+    if (.not. allocated(self%relaxing)) return
+    call self%difference_sums_block(lo, hi, self%relaxing%pull, sums)
+    f(lo:hi, :) = f(lo:hi, :) - sums(:hi - lo + 1, :)
   end subroutine force_block
 
   !> Stiffness of the control after Silling, c_i = g C_0 / W_i with C_0 = 48 E / (5 pi delta^2).
@@ -296,6 +332,55 @@ contains
     self%control = c
   end subroutine set_control
 
+  !> The relaxing control, from now on; its moments s~ are S[X].
+  subroutine set_relaxing(self, relaxing, position)
+    class(operators_t), intent(inout) :: self
+    type(relaxing_t),   intent(in)    :: relaxing
+    real(wp), intent(in), contiguous  :: position(:, :)   !! X (n,2) [m]
+    real(wp), allocatable :: x(:, :)
+    real(wp) :: sums(n_block, 2)
+    integer  :: block, lo, hi
+
+    self%relaxing = relaxing
+    call self%weigh_residuals(relaxing%falloff)
+    allocate (x, source=position)
+    call self%weigh_block(1, self%n, x)
+    !$omp parallel do schedule(static) default(none) shared(self, x) private(block, lo, hi, sums)
+    do block = 1, self%domain%blocks%count
+      lo = self%domain%blocks%lo(block)
+      hi = self%domain%blocks%hi(block)
+      call self%difference_sums_block(lo, hi, x, sums)
+      self%relaxing%moment(lo:hi, :) = sums(:hi - lo + 1, :)
+    end do
+    !$omp end parallel do
+  end subroutine set_relaxing
+
+  !> Energy stored in the relaxing control [J/m]; 0 without.
+  subroutine relaxing_energy(self, u, h, memory, energy)
+    class(operators_t), intent(in) :: self
+    real(wp), intent(in), contiguous :: u(:, :)         !! (n,2) [m]; as taken in
+    real(wp), intent(in), contiguous :: h(:, :)         !! H (n,4) xx xy yx yy
+    real(wp), intent(in), contiguous :: memory(:, :)   !! (n,4) [m]
+    real(wp), intent(out) :: energy
+    type(springs_t) :: rows
+    type(blocks_t)  :: blocks
+    real(wp), allocatable :: parts(:)
+    integer :: block
+
+    energy = 0.0_wp
+    if (.not. allocated(self%relaxing)) return
+    blocks = self%domain%blocks
+    allocate (parts(blocks%count))
+    !$omp parallel do schedule(static) default(none) private(block, rows) &
+    !$omp shared(self, blocks, u, h, memory, parts)
+    do block = 1, blocks%count
+      call self%look_at_block(block, u, h, rows)
+      parts(block) = self%relaxing%stored(blocks%lo(block), blocks%hi(block), rows, memory)
+    end do
+    !$omp end parallel do
+    energy = blocks%total(parts)
+  end subroutine relaxing_energy
+
   !> Energy of the control: with constant c it has a potential, (1/2) sum V c sum omega V_j |z|^2,
   !> which is the work of the control forces without the round-off of adding it up step by step. The
   !> force is linear in u, so this is half of the force times u:
@@ -310,7 +395,7 @@ contains
     real(wp), intent(in), contiguous :: h(:, :)     !! H (n,4) xx xy yx yy
     real(wp), intent(out) :: energy                 !! [J/m]; round-off does not make it negative
     type(blocks_t) :: blocks
-    real(wp), allocatable :: parts(:, :), z(:, :)
+    real(wp), allocatable :: parts(:), z(:, :)
     real(wp) :: mean(2)
     integer  :: block
 
@@ -318,39 +403,18 @@ contains
     if (.not. allocated(self%control)) return
     allocate (z(self%n, 2), source=0.0_wp)
     blocks = self%domain%blocks
-    allocate (parts(blocks%count, 3))
-    !$omp parallel do schedule(static) default(none) private(block) &
-    !$omp shared(blocks, volume, u, parts)
-    do block = 1, blocks%count
-      parts(block, :) = moments_of_block(blocks%lo(block), blocks%hi(block), volume, u)
-    end do
-    !$omp end parallel do
-    mean = [blocks%total(parts(:, 2)), blocks%total(parts(:, 3))] / blocks%total(parts(:, 1))
+    allocate (parts(blocks%count))
+    mean = mean_displacement(blocks, volume, u)
     !$omp parallel do schedule(static) default(none) private(block) &
     !$omp shared(self, blocks, volume, u, h, mean, z, parts)
     do block = 1, blocks%count
       call self%control_sums_block(blocks%lo(block), blocks%hi(block), u, z)
-      parts(block, 1) = control_energy_of_block(self, block, volume, u, h, mean, z)
+      parts(block) = control_energy_of_block(self, block, volume, u, h, mean, z)
     end do
     !$omp end parallel do
-    energy = blocks%total(parts(:, 1))
+    energy = blocks%total(parts)
     if (energy < 0.0_wp) energy = 0.0_wp   ! not max: it would hide what is not a number
   end subroutine control_energy
-
-  !> Sums of V and V u over rows lo to hi.
-  pure function moments_of_block(lo, hi, volume, u) result(moments)
-    integer,  intent(in) :: lo, hi
-    real(wp), intent(in), contiguous :: volume(:), u(:, :)
-    real(wp) :: moments(3), terms(n_block, 3)
-    integer  :: n
-
-    n = hi - lo + 1
-    terms(n + 1:, :) = 0.0_wp   ! sums go over whole blocks
-    terms(:n, 1) = volume(lo:hi)
-    terms(:n, 2) = volume(lo:hi) * u(lo:hi, 1)
-    terms(:n, 3) = volume(lo:hi) * u(lo:hi, 2)
-    moments = [block_sum(terms(:, 1)), block_sum(terms(:, 2)), block_sum(terms(:, 3))]
-  end function moments_of_block
 
   !> Energy of the control in one block.
   pure real(wp) function control_energy_of_block(self, block, volume, u, h, mean, z) &

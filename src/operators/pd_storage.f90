@@ -10,7 +10,7 @@ module pd_storage
   implicit none
   private
 
-  public :: storage_t, listed_storage, lattice_storage
+  public :: storage_t, listed_storage, lattice_storage, line_start
 
   type :: storage_t
     integer :: n = 0                       !! points
@@ -58,6 +58,13 @@ contains
     storage%row = margin + 1 + place(:, 1) - low(1) &
       + storage%stride * (place(:, 2) - low(2) + reach)
   end function lattice_storage
+
+  !> First row in the cache line of a row: blocks begin there.
+  pure integer function line_start(row)
+    integer, intent(in) :: row
+
+    line_start = n_line * ((row - 1) / n_line) + 1
+  end function line_start
 
   !> Rows in as many whole cache lines as hold a number of them.
   pure integer function whole_lines(count) result(rows)

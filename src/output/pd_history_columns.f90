@@ -49,7 +49,7 @@ contains
     call add(columns, column_t('damping_dissipation', 'J/m', 'work of the damping forces '// &
       'against the frame of the damping so far', value=damping_dissipation))
     call add(columns, column_t('stabilisation_energy', 'J/m', 'energy of the zero-energy '// &
-      'control; 0 without', value=stabilisation_energy))
+      'control, with what it has dissipated; 0 without', value=stabilisation_energy))
     call add(columns, column_t('external_work', 'J/m', 'work of prescribed motion, of loads, '// &
       'and of the moving frame of the damping so far', value=external_work))
     call add(columns, column_t('energy_error', '1', 'what the balance lacks, over the external '// &
@@ -244,7 +244,7 @@ contains
   pure real(wp) function stabilisation_energy(row) result(value)
     type(row_view_t), intent(in) :: row
 
-    value = row%control_energy
+    value = row%control_energy + row%moment%ledger%control_dissipation(row%model%blocks)
   end function stabilisation_energy
 
   pure real(wp) function external_work(row) result(value)

@@ -57,7 +57,7 @@ module pd_observe
     type(model_t), pointer :: model => null()
     type(moment_t) :: moment
     type(observation_t) :: seen                 !! columns from blocks, and those before this one
-    real(wp) :: control_energy = 0.0_wp         !! [J/m]
+    real(wp) :: control_energy = 0.0_wp         !! stored in the control [J/m]
     integer  :: boundary = 0, component = 0     !! that the column is about
   end type row_view_t
 
@@ -106,12 +106,16 @@ contains
     type(moment_t),        intent(in)    :: moment
     type(observation_t),   intent(out)   :: seen
     type(row_view_t) :: row
-    integer :: k
+    real(wp) :: held
+    integer  :: k
 
     row%model => model
     row%moment = moment
     call model%operators%control_energy(model%points%volume, state%displacement, &
       state%displacement_gradient, row%control_energy)
+    call model%operators%relaxing_energy(state%displacement, state%displacement_gradient, &
+      state%control_memory, held)
+    row%control_energy = row%control_energy + held
     allocate (row%seen%names(size(columns)), source=columns%name)
     allocate (row%seen%values(size(columns)), source=ieee_value(1.0_wp, ieee_quiet_nan))
     call observe_blocks(columns, model, state, row%seen%values)

@@ -242,10 +242,11 @@ contains
     checkpoint%frames_written = record%frames
     checkpoint%ledger_names = ledger_names
     checkpoint%ledger = [ledger%initial_kinetic_energy, ledger%largest_work, ledger%outer_work]
-    allocate (checkpoint%ledger_blocks(size(ledger%plastic), 3))
+    allocate (checkpoint%ledger_blocks(size(ledger%plastic), 4))
     checkpoint%ledger_blocks(:, 1) = ledger%plastic
     checkpoint%ledger_blocks(:, 2) = ledger%damping
     checkpoint%ledger_blocks(:, 3) = ledger%frame_work
+    checkpoint%ledger_blocks(:, 4) = ledger%control
     checkpoint%input = record%values
     checkpoint%position = model%points%position(model%operators%storage%row, :)
     checkpoint%volume = model%points%volume(model%operators%storage%row)
@@ -269,7 +270,7 @@ contains
       file_errors)
     if (file_errors%count() > 0) return
     if (size(checkpoint%ledger) /= size(ledger_names) &
-      .or. size(checkpoint%ledger_blocks, 2) /= 3) then
+      .or. size(checkpoint%ledger_blocks, 2) /= 4) then
       call file_errors%add('the checkpoint was written by another version of perigeo')
       return
     end if
@@ -279,6 +280,7 @@ contains
     ledger%plastic = checkpoint%ledger_blocks(:, 1)
     ledger%damping = checkpoint%ledger_blocks(:, 2)
     ledger%frame_work = checkpoint%ledger_blocks(:, 3)
+    ledger%control = checkpoint%ledger_blocks(:, 4)
     call compare_used(checkpoint%input, used_values(input), input_errors)
   end subroutine load_checkpoint
 

@@ -8,7 +8,7 @@ module pd_setup
   use pd_lattice, only: lattice_operators_t, new_lattice_operators
   use pd_model, only: model_t
   use pd_setup_loads, only: look_at_balance, set_up_loads, set_up_platens, set_up_supports
-  use pd_setup_materials, only: set_up_materials, set_up_points
+  use pd_setup_materials, only: set_up_materials, set_up_points, set_up_relaxing_control
   use pd_shape_tensor, only: invert_shape_tensors
   implicit none
   private
@@ -20,7 +20,8 @@ contains
   !> Operators, materials, supports, loads, damping.
   !>
   !> Errors: points that coincide, families that are too small, no free point, a pressure that acts
-  !> on no point, a platen under a traction with points of different density.
+  !> on no point, a platen under a traction with points of different density, a relaxing control of
+  !> families whose bonds are all equally long.
   subroutine set_up_model(input, model, errors)
     type(input_t),      intent(in)    :: input
     type(model_t),      intent(inout) :: model    !! in: with its body
@@ -38,6 +39,8 @@ contains
     if (errors%count() > 0) return
     call look_at_balance(model)
     call set_up_materials(input, model)
+    if (input%stabilisation%method == 'relaxing') &
+      call set_up_relaxing_control(input%stabilisation, horizon, model, errors)
     call set_up_supports(input, model, errors)
     call set_up_platens(input, model)
     call set_up_loads(input, model, errors)

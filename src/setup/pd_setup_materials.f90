@@ -3,8 +3,10 @@
 !> A new law or strain measure is a module of its own and a line in `new_law` or `new_measure`.
 module pd_setup_materials
   use pd_elastic, only: new_elastic
+  use pd_errors, only: error_list_t
+  use pd_families, only: horizon_t
   use pd_green_lagrange, only: green_lagrange_t
-  use pd_input_types, only: input_t, material_input_t
+  use pd_input_types, only: input_t, material_input_t, stabilisation_input_t
   use pd_j2, only: new_j2
   use pd_kinds, only: is_set, wp
   use pd_law, only: law_t
@@ -14,11 +16,12 @@ module pd_setup_materials
   use pd_model, only: model_t
   use pd_operators, only: control_stiffness
   use pd_random_field, only: lognormal, new_random_field, standard_normal
+  use pd_relaxing, only: new_relaxing, whole_family, whole_family_t
   use pd_small_strain, only: small_strain_t
   implicit none
   private
 
-  public :: set_up_points, set_up_materials
+  public :: set_up_points, set_up_materials, set_up_relaxing_control
 
 contains
 
@@ -118,6 +121,44 @@ contains
       call model%operators%set_control(storage%spread(c))
     end associate
   end subroutine set_up_control
+
+  !> The control that relaxes where the points flow, with the stiffness of each point's material.
+  !> On a lattice the whole family is that of its inner points, on a point cloud a full disc.
+  !>
+  !> Errors: all bonds of the family are equally long: nothing is left beside an affine field.
+  subroutine set_up_relaxing_control(given, horizon, model, errors)
+    type(stabilisation_input_t), intent(in) :: given
+    type(horizon_t),    intent(in)    :: horizon
+    type(model_t),      intent(inout) :: model
+    type(error_list_t), intent(inout) :: errors
+    real(wp), parameter :: fine = 64.0_wp   !! points per horizon that make a disc
+    type(whole_family_t)  :: family
+    real(wp), allocatable :: youngs_modulus(:)
+    logical :: turns
+    integer :: k
+
+    turns = .false.   ! with small strain a rotation is strain, and moments are those of the start
+    do k = 1, size(model%materials%list)
+      turns = turns .or. .not. same_type_as(model%materials%list(k)%measure, small_strain_t())
+    end do
+    family = whole_family(horizon, merge(model%spacing, model%delta / fine, &
+      allocated(model%body%place)))
+    if (family%weight <= 0.0_wp) then
+      call errors%add('the relaxing control needs bonds of different lengths', &
+        where='&stabilisation, key method', found='one length in every family', &
+        allowed='a horizon of at least 1.5 spacings, or another control')
+      return
+    end if
+    allocate (youngs_modulus(model%operators%n), source=0.0_wp)
+    do k = 1, size(model%materials%runs)
+      associate (run => model%materials%runs(k))
+        youngs_modulus(run%lo:run%hi) = model%materials%list(run%material)%youngs_modulus
+      end associate
+    end do
+    call model%operators%set_relaxing(new_relaxing(family, model%points%volume, youngs_modulus, &
+      model%delta, given%relaxing_stiffness, given%relaxing_strain, turns), &
+      model%points%position)
+  end subroutine set_up_relaxing_control
 
   !> sigma_y0 of every point: that of its material or a random field about it, reduced in the weak
   !> patch.

@@ -32,6 +32,7 @@ SHAPE = """\
 """
 CONTROL = "&stabilisation method = 'silling', factor = 0.05 /\n"
 HARDENING = changed(SHAPE, isotropic_modulus="2.0e6", kinematic_modulus="1.0e6")
+RELAXING = "&stabilisation method = 'relaxing', relaxing_strain = 1.0e-2 /\n"
 APART = (
     SHAPE.replace(  # three bodies with gaps that bonds cross: places without points between them
         "&body x_min = 0.6, x_max = 1.1, y_min = 0.0, y_max = 0.4 /\n",
@@ -45,6 +46,7 @@ AGREEING = {
     "isotropic": changed(SHAPE, isotropic_modulus="2.0e6"),
     "kinematic": changed(SHAPE, kinematic_modulus="2.0e6"),
     "both moduli with control": HARDENING + CONTROL,
+    "both moduli with relaxing control": HARDENING + RELAXING,
     "three bodies": changed(APART, isotropic_modulus="2.0e6"),
 }
 # Bands amplify round-off. This seed is large, so that it decides where they form.

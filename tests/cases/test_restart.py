@@ -108,6 +108,19 @@ def test_a_run_may_be_stopped_twice(program, run_case, tmp_path, straight):
     assert_same(tmp_path / "out", straight)
 
 
+def test_a_control_that_relaxes_goes_on_where_it_was(program, run_case, tmp_path):
+    text = LONG + "&stabilisation method = 'relaxing' /\n"
+    (tmp_path / "straight").mkdir()
+    done = run_case(text, tmp_path / "straight", "--quiet", "--threads", "1")
+    assert done.returncode == 0, done.stderr
+    rows = history(tmp_path / "straight" / "out" / "case_history.csv")
+    assert rows["stabilisation_energy"][-1] > 0
+    # late enough for points to flow, so that there is something to remember
+    assert stop(begin(program, tmp_path, text), signal.SIGTERM, tmp_path, 200) == 143
+    assert run_case(text, tmp_path, "--restart", "--quiet").returncode == 0
+    assert_same(tmp_path / "out", tmp_path / "straight" / "out")
+
+
 def test_a_run_that_was_killed_goes_on_from_its_last_checkpoint(
     program, run_case, tmp_path, straight
 ):

@@ -5,6 +5,7 @@ import pytest
 from case_files import SPECIMEN, changed, same_points_and_frames
 
 CONTROL = "&stabilisation method = 'silling', factor = 0.01 /\n"
+RELAXING = "&stabilisation method = 'relaxing' /\n"
 TEXT = changed(
     SPECIMEN, spacing="0.05", horizon="0.16", x_max="1.0", y_max="2.0", final_strain="0.005"
 ).replace("frame_strains = 0.004, 0.01", "frame_count = 3")
@@ -13,7 +14,11 @@ TEXT = changed(
 FIELD = "&random_field coefficient_of_variation = 0.2, correlation_length = 0.2 /\n"
 
 
-@pytest.mark.parametrize("more", ["", CONTROL, FIELD], ids=["plain", "with control", "with field"])
+@pytest.mark.parametrize(
+    "more",
+    ["", CONTROL, RELAXING, FIELD],
+    ids=["plain", "with control", "with relaxing control", "with field"],
+)
 def test_history_and_frames_have_the_same_bits(run_case, tmp_path, more):
     results = []
     for threads in (1, 2, 3):

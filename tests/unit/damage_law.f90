@@ -5,9 +5,10 @@
 !> and the line of set-up that chooses it.
 module damage_law
   use pd_elastic, only: isotropic_stress_block
+  use pd_flow, only: flow_t
   use pd_kinds, only: n_block, wp
   use pd_labels, only: label_t
-  use pd_law, only: flow_t, law_points_t, law_t
+  use pd_law, only: law_points_t, law_t
   implicit none
   private
 

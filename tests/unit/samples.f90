@@ -6,11 +6,12 @@ module samples
   use pd_elastic, only: new_elastic
   use pd_errors, only: error_list_t
   use pd_families, only: horizon_t, new_horizon
+  use pd_flow, only: flow_t
   use pd_forces, only: internal_forces
   use pd_geometry, only: body_t, lattice_body, lattice_t, layer_t
   use pd_green_lagrange, only: green_lagrange_t
   use pd_kinds, only: wp
-  use pd_law, only: flow_t, law_points_t, law_t
+  use pd_law, only: law_points_t, law_t
   use pd_materials, only: divide_into_runs, material_t, materials_t
   use pd_measure, only: measure_t
   use pd_model, only: model_t
