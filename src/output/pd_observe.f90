@@ -17,7 +17,7 @@ module pd_observe
 
   public :: moment_t, block_view_t, row_view_t, column_t, observation_t
   public :: total, mean, largest, smallest
-  public :: moment_at, observe, surplus, running_away
+  public :: moment_at, observe, surplus, imbalance
 
   !> When a state is looked at.
   type :: moment_t
@@ -225,14 +225,14 @@ contains
       - seen%value('external_work')
   end function surplus
 
-  !> Whether the run has gained as much energy from nowhere as was ever put into it. Not a number
-  !> counts as running away.
-  pure logical function running_away(seen, ledger)
+  !> What the balance lacks, over the largest work that was ever done or the initial kinetic energy;
+  !> not a number where the state is not one.
+  pure real(wp) function imbalance(seen, ledger)
     type(observation_t), intent(in) :: seen
     type(ledger_t),      intent(in) :: ledger
 
-    running_away = .not. surplus(seen, ledger) <= max(ledger%largest_work, &
-      ledger%initial_kinetic_energy) + tiny(1.0_wp)
-  end function running_away
+    imbalance = surplus(seen, ledger) &
+      / max(ledger%largest_work, ledger%initial_kinetic_energy, 1.0e-280_wp)
+  end function imbalance
 
 end module pd_observe

@@ -108,3 +108,28 @@ def test_a_step_one_tenth_beyond_the_limit_diverges(run_case, tmp_path, m, contr
         text = pushed(*case, step=factor * limit)
         done = run_case(text, tmp_path, "--force", "--quiet", "--threads", "1")
         assert done.returncode == status, (factor, done.stderr)
+
+
+# An elastic specimen squeezed fast: points come closer, and frequencies rise with the strain.
+SQUEEZED = """\
+&run name = 'case', output_dir = 'out' /
+&discretisation spacing = 0.1, horizon = 0.25 /
+&body x_min = 0.0, x_max = 0.5, y_min = 0.0, y_max = 1.0 /
+&material model = 'elastic', strain_measure = 'green_lagrange', density = 2000.0
+  youngs_modulus = 50.0e6, poissons_ratio = 0.3 /
+&boundary name = 'bottom', side = 'bottom' /
+&boundary name = 'top', side = 'top', contact = 'smooth', velocity = 0.0, -0.1 /
+&integration final_strain = 0.3, safety = 0.99, damping = 5.0e5, damping_frame = 'platens' /
+&output history_count = 500 /
+"""
+
+
+def test_a_row_with_a_wrong_energy_is_doubted_and_then_not_called_good(run_case, tmp_path):
+    done = run_case(SQUEEZED, tmp_path, "--quiet")
+    assert done.returncode == 4
+    assert "the calculation failed: the energy balance is off by" in done.stderr
+    log = (tmp_path / "out" / "case.log").read_text()
+    assert log.count("warning: the energy balance is off by") == 1
+    error = history(tmp_path / "out" / "case_history.csv")["energy_error"]
+    assert np.abs(error).max() <= 0.1
+    assert (np.abs(error[:-2]) < 0.01).all()
