@@ -24,6 +24,7 @@ ROOT = Path(__file__).resolve().parents[1]
 # The documents in the order of their list, and the names of their pages.
 PAGES = {
     "doc/input.md": "input",
+    "doc/model.md": "model",
     "doc/studies.md": "studies",
     "doc/results.md": "results",
     "doc/theory.md": "theory",

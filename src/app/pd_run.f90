@@ -42,6 +42,7 @@ module pd_run
     type(checkpoint_t) :: checkpoint          !! to continue from; no rows: a new run
     type(error_list_t) :: warnings
     logical :: doubted = .false.              !! the energy balance has been warned of
+    logical :: control_doubted = .false.      !! the part of the control in the work, too
     integer(int64) :: last_checkpoint = 0     !! count of the system clock
     integer(int64) :: loop_start = 0          !! count of the system clock
   end type run_t

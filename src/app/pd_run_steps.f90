@@ -110,7 +110,26 @@ contains
         short_number(100.0_wp * lacking)//' % of the work at step '// &
         integer_text(run%clock%step)//'; above 1 % a smaller safety or time step is due', errors)
     end if
+    if (.not. outcome%done) call look_at_control(run, errors)
   end subroutine look_at_balance
+
+  !> A control of zero-energy modes with more than 1 % of the work carries load that the material
+  !> may not be able to: told once.
+  subroutine look_at_control(run, errors)
+    type(run_t),        intent(inout) :: run
+    type(error_list_t), intent(inout) :: errors
+    real(wp), parameter :: most = 1.0e-2_wp
+    real(wp) :: part
+
+    if (run%control_doubted) return
+    part = run%record%seen%value('stabilisation_energy') / max(run%ledger%largest_work, &
+      run%ledger%initial_kinetic_energy, 1.0e-280_wp)
+    if (part <= most) return
+    run%control_doubted = .true.
+    call record_line(run%record, 'warning: the control of zero-energy modes has '// &
+      short_number(100.0_wp * part)//' % of the work at step '//integer_text(run%clock%step)// &
+      '; above 1 % it carries load that the material may not', errors)
+  end subroutine look_at_control
 
   !> Write the frames that are due at this step, and a checkpoint.
   subroutine write_frames_and_checkpoint(due, run, errors)

@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from case_files import history
+from case_files import SPECIMEN, history
 
 SPACING, DENSITY, YOUNGS = 0.1, 2000.0, 50.0e6
 STEPS = 300  # about
@@ -133,3 +133,11 @@ def test_a_row_with_a_wrong_energy_is_doubted_and_then_not_called_good(run_case,
     error = history(tmp_path / "out" / "case_history.csv")["energy_error"]
     assert np.abs(error).max() <= 0.1
     assert (np.abs(error[:-2]) < 0.01).all()
+
+
+@pytest.mark.parametrize(("factor", "warned"), [("1.0", True), ("0.001", False)])
+def test_a_control_that_carries_load_is_doubted(run_case, tmp_path, factor, warned):
+    control = f"&stabilisation method = 'silling', factor = {factor} /\n"
+    assert run_case(SPECIMEN + control, tmp_path, "--quiet").returncode == 0
+    log = (tmp_path / "out" / "case.log").read_text()
+    assert log.count("warning: the control of zero-energy modes has") == warned
