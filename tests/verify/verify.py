@@ -143,7 +143,7 @@ def moduli() -> list[Row]:
             spacing, horizon = (0.08 / m, 0.08) if horizon_fixed else (0.02, 0.02 * m)
             groups = [
                 *specimen(spacing, horizon),
-                material("elastic"),
+                material("elastic", strain_measure="green_lagrange"),  # the paper's
                 *platens(),
                 (
                     "integration",
