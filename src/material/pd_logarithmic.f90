@@ -44,7 +44,7 @@ module pd_logarithmic
   real(wp), parameter :: lower_volume(3) = [&
     -21.0_wp / 13.0_wp, 105.0_wp / 143.0_wp, -35.0_wp / 429.0_wp]
   !> These keep quotients finite where d = 0, and at points that have failed.
-  real(wp), parameter :: smallest = 1.0e-280_wp, smallest_j = 1.0e-20_wp
+  real(wp), parameter :: smallest = 1.0e-200_wp, smallest_j = 1.0e-20_wp, smallest_b = 1.0e-10_wp
 
 contains
 
@@ -160,7 +160,7 @@ contains
     real(wp), intent(out) :: shear        !! its component xy: 2 D_xy
 
     growth = hxx + hyy + (hxx * hyy - hxy * hyx)
-    b = max(smallest**0.25_wp, &
+    b = max(smallest_b, &
       1.0_wp + (hxx + hyy) + 0.5_wp * (hxx**2 + hxy**2 + hyx**2 + hyy**2))
     difference = hxx - hyy + 0.5_wp * ((hxx - hxy) * (hxx + hxy) + (hyx - hyy) * (hyx + hyy))
     shear = hxy + hyx + hxx * hxy + hyx * hyy
