@@ -5,7 +5,7 @@ module pd_run_steps
   use pd_errors, only: error_list_t, exit_calculation, exit_file, exit_interrupted, &
     exit_terminated, outcome_t
   use pd_kinds, only: wp
-  use pd_observe, only: imbalance
+  use pd_observe, only: imbalance, over_work
   use pd_progress, only: progress_due
   use pd_record, only: close_record, observe_state, record_failure, record_frame, record_line, &
     record_progress, record_row, save_checkpoint
@@ -122,13 +122,12 @@ contains
     real(wp) :: part
 
     if (run%control_doubted) return
-    part = run%record%seen%value('stabilisation_energy') / max(run%ledger%largest_work, &
-      run%ledger%initial_kinetic_energy, 1.0e-280_wp)
+    part = over_work(run%record%seen%value('stabilisation_energy'), run%ledger)
     if (part <= most) return
     run%control_doubted = .true.
     call record_line(run%record, 'warning: the control of zero-energy modes has '// &
       short_number(100.0_wp * part)//' % of the work at step '//integer_text(run%clock%step)// &
-      '; above 1 % it carries load that the material may not', errors)
+      '; above 1 % it carries load that the material may not: a weaker control is due', errors)
   end subroutine look_at_control
 
   !> Write the frames that are due at this step, and a checkpoint.

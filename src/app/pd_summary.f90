@@ -64,7 +64,7 @@ contains
       call summary%add('bonds', number(bonds)//'; per point '// &
         number(bonds / real(body%n, wp))// &
         ' on average, '//whole(fewest)//' at least')
-      if (model%unbalanced > 0.0_wp) call summary%add('imbalance', number(model%unbalanced)// &
+      if (model%unbalanced >= 0.0_wp) call summary%add('imbalance', number(model%unbalanced)// &
         ': the force that a homogeneous stress leaves on a point inside, at most, over that at '// &
         'a surface; 0 on a lattice')
       call summary%add('horizon', number(model%delta)//' m, spacing '// &

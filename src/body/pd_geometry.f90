@@ -236,9 +236,12 @@ contains
     ends = min(real(n, wp) + 1.0_wp, max(-1.0_wp, (layer%span - origin) / lattice%spacing))
     on_line(1) = max(on_line(1), floor(ends(1) - offset + round_off) + 1)
     on_line(2) = min(on_line(2), ceiling(ends(2) - offset - round_off) - 1)
-    squares(1) = max(squares(1), floor(ends(1) + round_off))
-    squares(2) = min(squares(2), ceiling(ends(2) - round_off) - 1)
-    if (lattice%cells) squares = on_line
+    if (lattice%cells) then
+      squares = on_line
+    else
+      squares(1) = max(squares(1), floor(ends(1) + round_off))
+      squares(2) = min(squares(2), ceiling(ends(2) - round_off) - 1)
+    end if
   end subroutine find_range
 
   !> The rectangle of every point: the last one that holds it. A layer continues what is beside it.

@@ -208,12 +208,13 @@ contains
     end do
   end subroutine strain_block
 
-  !> First Piola stress of the rows of a block.
-  pure subroutine first_piola_block(self, block, h, stress, p)
+  !> Strain and first Piola stress of the rows of a block.
+  pure subroutine first_piola_block(self, block, h, stress, strain, p)
     class(materials_t), intent(in) :: self
     integer,  intent(in) :: block
     real(wp), intent(in), contiguous :: h(:, :)        !! H (n,4) xx xy yx yy
     real(wp), intent(in), contiguous :: stress(:, :)   !! conjugate stress (n,4) xx yy zz xy [Pa]
+    real(wp), intent(inout) :: strain(n_block, 4)      !! out: E xx yy zz xy
     real(wp), intent(inout) :: p(n_block, 4)           !! out: P xx xy yx yy [Pa]
     real(wp) :: kept(n_block, n_kept)
     integer  :: first, k
@@ -221,7 +222,7 @@ contains
     first = self%runs(self%first_run(block))%lo
     do k = self%first_run(block), self%first_run(block + 1) - 1
       associate (run => self%runs(k), measure => self%list(self%runs(k)%material)%measure)
-        call measure%strain_block(first, run%lo, run%hi, h, p, kept)
+        call measure%strain_block(first, run%lo, run%hi, h, strain, kept)
         call measure%first_piola_block(first, run%lo, run%hi, h, stress, kept, p)
       end associate
     end do

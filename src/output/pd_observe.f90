@@ -17,7 +17,7 @@ module pd_observe
 
   public :: moment_t, block_view_t, row_view_t, column_t, observation_t
   public :: total, mean, largest, smallest
-  public :: moment_at, observe, surplus, imbalance
+  public :: moment_at, observe, surplus, imbalance, over_work
 
   !> When a state is looked at.
   type :: moment_t
@@ -197,9 +197,8 @@ contains
     end if
     block%weight(:block%hi - block%lo + 1) = model%points%in_body(block%lo:block%hi) &
       * model%points%volume(block%lo:block%hi)
-    call model%materials%strain_block(block%number, state%displacement_gradient, block%strain)
     call model%materials%first_piola_block(block%number, state%displacement_gradient, &
-      state%stress, block%p)
+      state%stress, block%strain, block%p)
   end subroutine fill_view
 
   !> The value of a column; not a number where there is none of this name.
@@ -231,8 +230,16 @@ contains
     type(observation_t), intent(in) :: seen
     type(ledger_t),      intent(in) :: ledger
 
-    imbalance = surplus(seen, ledger) &
-      / max(ledger%largest_work, ledger%initial_kinetic_energy, 1.0e-280_wp)
+    imbalance = over_work(surplus(seen, ledger), ledger)
   end function imbalance
+
+  !> An energy over the largest work that was ever done or the initial kinetic energy.
+  pure real(wp) function over_work(energy, ledger)
+    real(wp),       intent(in) :: energy   !! [J/m]
+    type(ledger_t), intent(in) :: ledger
+    real(wp), parameter :: nothing = 1.0e-280_wp   !! [J/m]; keeps the quotient finite
+
+    over_work = energy / max(ledger%largest_work, ledger%initial_kinetic_energy, nothing)
+  end function over_work
 
 end module pd_observe

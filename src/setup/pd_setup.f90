@@ -7,7 +7,7 @@ module pd_setup
   use pd_kinds, only: wp
   use pd_lattice, only: lattice_operators_t, new_lattice_operators
   use pd_model, only: model_t
-  use pd_setup_loads, only: look_at_balance, set_up_loads, set_up_platens, set_up_supports
+  use pd_setup_loads, only: find_unbalanced, set_up_loads, set_up_platens, set_up_supports
   use pd_setup_materials, only: set_up_materials, set_up_points, set_up_relaxing_control
   use pd_shape_tensor, only: invert_shape_tensors
   implicit none
@@ -37,7 +37,7 @@ contains
     call set_up_points(model)
     call invert_shape_tensors(model%operators, model%points%position, model%points%volume, errors)
     if (errors%count() > 0) return
-    call look_at_balance(model)
+    call find_unbalanced(model)
     call set_up_materials(input, model)
     if (input%stabilisation%method == 'relaxing') &
       call set_up_relaxing_control(input%stabilisation, horizon, model, errors)

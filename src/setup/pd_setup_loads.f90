@@ -21,7 +21,7 @@ module pd_setup_loads
   implicit none
   private
 
-  public :: look_at_balance, set_up_supports, set_up_platens, set_up_loads
+  public :: find_unbalanced, set_up_supports, set_up_platens, set_up_loads
 
 contains
 
@@ -141,8 +141,8 @@ contains
 
   !> Largest |N_i| / sqrt(V_i) inside a body whose points are on no lattice: a homogeneous stress P
   !> leaves the force P N_i there. It is 1 at a straight surface, and 0 inside a lattice. Inside is
-  !> what is more than two horizons from the box around the points; 0 where nothing is.
-  subroutine look_at_balance(model)
+  !> what is more than two horizons from the box around the points.
+  subroutine find_unbalanced(model)
     type(model_t), intent(inout) :: model
     real(wp), allocatable :: vectors(:, :)
     real(wp) :: lower(2), upper(2)
@@ -159,7 +159,7 @@ contains
       model%unbalanced = max(model%unbalanced, &
         norm2(vectors(row, :)) / sqrt(model%points%volume(row)))
     end do
-  end subroutine look_at_balance
+  end subroutine find_unbalanced
 
   !> Loads, in the order in which they are added to the forces.
   !>
