@@ -10,7 +10,6 @@ module pd_run_steps
   use pd_record, only: close_record, observe_state, record_failure, record_frame, record_line, &
     record_progress, record_row, save_checkpoint
   use pd_run, only: run_t
-  use pd_schedule, only: row_due
   use pd_system, only: pending_signal, sigint
   use pd_text, only: integer_text, short_number
   use pd_timing, only: kernel_history, kernel_names
@@ -36,8 +35,8 @@ contains
     integer :: step
 
     step = run%clock%step + 1
-    due%row = row_due(run%schedule, step)
-    due%frame = any(run%schedule%frame_steps == step)
+    due%row = run%schedule%row_due(step)
+    due%frame = run%schedule%frames_due(step) > 0
     due%stop = pending_signal() /= 0
     due%checkpoint = due%stop
     associate (every => run%input%output%checkpoint_every)
@@ -97,8 +96,8 @@ contains
     real(wp) :: lacking
     logical  :: first
 
-    if (run%clock%step == 1 .and. run%schedule%steps > 1) return
-    first = run%clock%step <= min(first_steps, run%schedule%steps - 1)
+    first = run%clock%step <= first_steps .and. .not. run%schedule%is_over(run%clock)
+    if (first .and. run%clock%step == 1) return
     lacking = imbalance(run%record%seen, run%ledger)
     if (first .and. lacking <= 1.0_wp) return
     if (.not. abs(lacking) <= failed) then
@@ -137,7 +136,7 @@ contains
     type(error_list_t), intent(inout) :: errors
     integer :: k
 
-    do k = 1, merge(count(run%schedule%frame_steps == run%clock%step), 0, due%frame)
+    do k = 1, merge(run%schedule%frames_due(run%clock%step), 0, due%frame)
       call record_frame(run%model, run%state, run%record, errors)
     end do
     if (.not. due%checkpoint) return
@@ -199,7 +198,7 @@ contains
     call system_clock(now, rate)
     whole = real(now - run%loop_start, wp) / real(rate, wp)
     write (line, '(a,f10.3,a,i0)') 'time loop ', whole, ' s, steps ', &
-      run%schedule%steps - run%checkpoint%clock%step
+      run%clock%step - run%checkpoint%clock%step
     call record_line(run%record, trim(line), errors)
     write (line, '(a,9(2x,a,f9.3))') 'kernels [s] ', &
       (trim(kernel_names(k)), run%timing%seconds(k), k=1, size(kernel_names)), 'frames', &

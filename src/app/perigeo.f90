@@ -29,7 +29,7 @@ program perigeo
   if (options%check .and. .not. outcome%done) call print_check(options%input_path, run, outcome)
   call catch_signals()
   if (.not. outcome%done) call open_outputs(options, run, outcome)
-  do while (.not. outcome%done .and. run%clock%step < run%schedule%steps)
+  do while (.not. outcome%done .and. .not. run%schedule%is_over(run%clock))
     due = due_after_next_step(run)
     call take_step(run%clock, due%anything, run%model, run%state, run%work, run%ledger, &
       run%timing, failed_row)

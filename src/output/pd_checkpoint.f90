@@ -55,7 +55,7 @@ module pd_checkpoint
   end type reading_t
 
   integer, parameter :: head_length = 512
-  integer, parameter :: schema_version = 2
+  integer, parameter :: schema_version = 3
   character(*), parameter :: schema = 'perigeo checkpoint'
 
 contains
@@ -156,6 +156,8 @@ contains
     call write_attribute(file, '/', 'step', checkpoint%clock%step, errors)
     call write_attribute(file, '/', 'time', checkpoint%clock%time(), errors)
     call write_attribute(file, '/', 'time_step', checkpoint%clock%time_step, errors)
+    call write_attribute(file, '/', 'start_step', checkpoint%clock%start_step, errors)
+    call write_attribute(file, '/', 'start_time', checkpoint%clock%start_time, errors)
     call write_attribute(file, '/', 'history_rows', checkpoint%history_rows, errors)
     call write_attribute(file, '/', 'frames_written', checkpoint%frames_written, errors)
     call write_dataset(file, '/ledger_names', checkpoint%ledger_names, errors)
@@ -278,6 +280,8 @@ contains
 
     call read_attribute(file, '/', 'step', checkpoint%clock%step, errors)
     call read_attribute(file, '/', 'time_step', checkpoint%clock%time_step, errors)
+    call read_attribute(file, '/', 'start_step', checkpoint%clock%start_step, errors)
+    call read_attribute(file, '/', 'start_time', checkpoint%clock%start_time, errors)
     call read_attribute(file, '/', 'history_rows', checkpoint%history_rows, errors)
     call read_attribute(file, '/', 'frames_written', checkpoint%frames_written, errors)
     call read_dataset(file, '/ledger_names', checkpoint%ledger_names, errors)

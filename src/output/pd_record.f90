@@ -21,7 +21,7 @@ module pd_record
   use pd_result, only: add_row, create_result, finish_result, places_t, result_exists, result_t, &
     resume_result, write_failed_frame, write_frame, write_rows
   use pd_run_description, only: provenance_t, run_description_t
-  use pd_schedule, only: rows_due, schedule_t
+  use pd_schedule, only: schedule_t
   use pd_state, only: state_t
   implicit none
   private
@@ -83,15 +83,15 @@ contains
     if (restart) then
       call resume_result(record%result, record%stem, description, &
         places_t(checkpoint%frames_written, checkpoint%history_rows), &
-        places_t(count(schedule%frame_steps > checkpoint%clock%step), &
-        rows_due(schedule, checkpoint%clock%step)), checkpoint%clock%step, errors)
+        places_t(schedule%frames_left(checkpoint%clock%step), &
+        schedule%rows_left(checkpoint%clock%step)), checkpoint%clock%step, errors)
       if (errors%count() == 0) call resume_history(record%history, record%stem, record%columns, &
         checkpoint%history_rows, errors)
       record%frames = checkpoint%frames_written
     else
       ! the old checkpoints go last: until the new result is there a full disk must cost nothing
       call create_result(record%result, record%stem, description, &
-        places_t(size(schedule%frame_steps) + 1, rows_due(schedule, 0) + 1), errors)
+        places_t(schedule%frames_left(0) + 1, schedule%rows_left(0) + 1), errors)
       if (errors%count() == 0) call remove_checkpoints(record%stem, errors)
       if (errors%count() == 0) &
         call create_history(record%history, record%stem, record%columns, errors)
@@ -140,7 +140,7 @@ contains
     type(error_list_t), intent(inout) :: errors
 
     call close_history(record%history, errors)
-    if (errors%count() == 0) call finish_result(record%result, errors)
+    if (errors%count() == 0) call finish_result(record%result, record%moment, errors)
     call close_progress(record%progress, errors)
   end subroutine close_record
 
