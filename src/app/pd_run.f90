@@ -7,6 +7,7 @@ module pd_run
   use pd_command_line, only: options_t
   use pd_errors, only: error_list_t, exit_file, exit_input, exit_model, outcome_t
   use pd_history_columns, only: history_columns
+  use pd_increment, only: increments_t, new_increments
   use pd_input, only: read_input
   use pd_input_types, only: input_t
   use pd_ledger, only: ledger_t, new_ledger
@@ -37,11 +38,13 @@ module pd_run
     type(state_t)      :: state
     type(ledger_t)     :: ledger
     type(step_work_t)  :: work
+    type(increments_t) :: increments          !! on the way of equilibrium
     type(record_t)     :: record
     type(timing_t)     :: timing
     type(checkpoint_t) :: checkpoint          !! to continue from; no rows: a new run
     type(error_list_t) :: warnings
     logical :: doubted = .false.              !! the energy balance has been warned of
+    logical :: balance_doubted = .false.      !! that of the forces, too
     logical :: control_doubted = .false.      !! the part of the control in the work, too
     integer(int64) :: last_checkpoint = 0     !! count of the system clock
     integer(int64) :: loop_start = 0          !! count of the system clock
@@ -88,7 +91,14 @@ contains
     run%clock = run%checkpoint%clock
     call set_up_schedule(run%input, run%clock, run%model, run%schedule, errors)
     call outcome%end_if_any(errors, exit_input)
-    if (.not. outcome%done .and. .not. options%check) call begin_state(run)
+    if (outcome%done .or. options%check) return
+    if (run%model%at_equilibrium) then
+      associate (given => run%input%integration)
+        call new_increments(run%model, given%increments, given%relaxation, given%residual, &
+          run%schedule, run%clock, run%increments)
+      end associate
+    end if
+    call begin_state(run)
   end subroutine set_up_run
 
   !> Warn of what can be set up and is hardly meant.

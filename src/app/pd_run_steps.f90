@@ -2,7 +2,7 @@
 !> or is stopped by a signal.
 module pd_run_steps
   use, intrinsic :: iso_fortran_env, only: error_unit, int64
-  use pd_errors, only: error_list_t, exit_calculation, exit_file, exit_interrupted, &
+  use pd_errors, only: error_list_t, exit_calculation, exit_file, exit_interrupted, exit_ok, &
     exit_terminated, outcome_t
   use pd_kinds, only: wp
   use pd_observe, only: imbalance, over_work
@@ -13,10 +13,11 @@ module pd_run_steps
   use pd_system, only: pending_signal, sigint
   use pd_text, only: integer_text, short_number
   use pd_timing, only: kernel_history, kernel_names
+  use pd_unbalanced, only: loads_at
   implicit none
   private
 
-  public :: due_t, due_after_next_step, write_what_is_due, finish_run
+  public :: due_t, due_after_step, write_what_is_due, end_without_equilibrium, finish_run
 
   !> What is written after a step. This is known before the step: only then must its state be whole.
   type :: due_t
@@ -27,14 +28,12 @@ module pd_run_steps
 
 contains
 
-  !> What is due after the next step. A signal that comes during a step takes effect after the next
-  !> one.
-  type(due_t) function due_after_next_step(run) result(due)
+  !> What is due after a step. A signal that comes during a step takes effect after the next one.
+  type(due_t) function due_after_step(step, run) result(due)
+    integer,     intent(in) :: step
     type(run_t), intent(in) :: run
     integer(int64) :: now, rate
-    integer :: step
 
-    step = run%clock%step + 1
     due%row = run%schedule%row_due(step)
     due%frame = run%schedule%frames_due(step) > 0
     due%stop = pending_signal() /= 0
@@ -47,7 +46,7 @@ contains
       end if
     end associate
     due%anything = due%row .or. due%frame .or. due%checkpoint
-  end function due_after_next_step
+  end function due_after_step
 
   !> Write what is due, but check the state first: a run that gains energy has failed.
   !>
@@ -109,7 +108,9 @@ contains
         short_number(100.0_wp * lacking)//' % of the work at step '// &
         integer_text(run%clock%step)//'; above 1 % a smaller safety or time step is due', errors)
     end if
-    if (.not. outcome%done) call look_at_control(run, errors)
+    if (outcome%done) return
+    call look_at_control(run, errors)
+    call look_at_equilibrium(run, errors)
   end subroutine look_at_balance
 
   !> A control of zero-energy modes with more than 1 % of the work carries load that the material
@@ -128,6 +129,68 @@ contains
       short_number(100.0_wp * part)//' % of the work at step '//integer_text(run%clock%step)// &
       '; above 1 % it carries load that the material may not: a weaker control is due', errors)
   end subroutine look_at_control
+
+  !> Forces that are not in balance where they are meant to be: told once.
+  !>
+  !> On the way of equilibrium increments that did not come to rest. In a damped motion, which is
+  !> meant to follow equilibrium, a damping that carries a sizeable part of the load.
+  subroutine look_at_equilibrium(run, errors)
+    type(run_t),        intent(inout) :: run
+    type(error_list_t), intent(inout) :: errors
+    !> The start of a motion is none of equilibrium.
+    real(wp), parameter :: most = 5.0e-2_wp, at_first = 0.1_wp
+    real(wp) :: part
+
+    if (run%balance_doubted) return
+    if (run%model%at_equilibrium) then
+      if (run%increments%unfinished == 0) return
+      call record_line(run%record, 'warning: an increment was taken that is not at rest: the '// &
+        'unbalanced force at step '//integer_text(run%clock%step)//' is '// &
+        short_number(run%increments%last%residual)//' of the reactions and loads', errors)
+    else
+      part = run%record%seen%value('damping_share')
+      if (.not. part > most .or. run%clock%time() < at_first * run%schedule%end_time) return
+      call record_line(run%record, 'warning: forces of the damping are '// &
+        short_number(100.0_wp * part)//' % of the reactions and loads at step '// &
+        integer_text(run%clock%step)//'; stresses then depend on rate and damping: slower '// &
+        'loading, less damping, or method = ''equilibrium''', errors)
+    end if
+    run%balance_doubted = .true.
+  end subroutine look_at_equilibrium
+
+  !> No equilibrium was found. Under loads that is their limit: the last equilibrium is written, and
+  !> the run is finished. Without loads it is a failure.
+  subroutine end_without_equilibrium(run, outcome)
+    type(run_t),     intent(inout) :: run
+    type(outcome_t), intent(inout) :: outcome
+    type(error_list_t) :: errors
+    character(:), allocatable :: tried
+    integer :: row
+
+    associate (last => run%increments%last, t => run%clock%time())
+      tried = short_number(t + run%clock%time_step)//' s, where the unbalanced force is '// &
+        short_number(last%residual)//' of reactions and loads after '// &
+        integer_text(last%moves)//' moves'
+      if (.not. run%increments%under_load) then
+        row = last%failed_row
+        if (row == 0) row = fastest_row(run)
+        call fail('no equilibrium was found at '//tried, row, run, outcome)
+        return
+      end if
+      if (run%record%moment%step /= run%clock%step) then
+        call run%ledger%note_work(run%model%blocks)
+        call observe_state(run%model, run%state, run%ledger, run%clock, run%record)
+        call record_row(run%record, errors)
+      end if
+      call record_frame(run%model, run%state, run%record, errors)
+      call record_line(run%record, 'limit load: the last equilibrium is at '//short_number(t)// &
+        ' s, under loads of '//short_number(loads_at(run%model, t))//' N/m in all; there is '// &
+        'none at '//tried, errors)
+    end associate
+    call outcome%end_if_any(errors, exit_file)
+    if (.not. outcome%done) call finish_run(run, outcome)
+    if (.not. outcome%done) call outcome%end_with(exit_ok)
+  end subroutine end_without_equilibrium
 
   !> Write the frames that are due at this step, and a checkpoint.
   subroutine write_frames_and_checkpoint(due, run, errors)
@@ -159,6 +222,7 @@ contains
     type(outcome_t), intent(inout) :: outcome
     type(error_list_t) :: errors, file_errors
     character(160) :: where
+    character(:), allocatable :: remedy
 
     associate (x => run%model%points%position)
       write (where, '(a,i0,a,es12.5,a,i0,a,g0.7,a,g0.7,a)') 'step ', run%clock%step, ', time ', &
@@ -168,8 +232,10 @@ contains
     call record_failure(run%model, run%state, run%clock, run%record, file_errors)
     call record_line(run%record, 'the calculation failed: '//reason//'; '//trim(where), file_errors)
     call file_errors%print(error_unit)
+    remedy = 'a smaller safety or time step'
+    if (run%model%at_equilibrium) remedy = 'more increments, or an imperfection,'
     call errors%add('the calculation failed: '//reason//'; the frames and rows before this '// &
-      'step are good; a smaller safety or time step may help', trim(where))
+      'step are good; '//remedy//' may help', trim(where))
     call outcome%end_if_any(errors, exit_calculation)
   end subroutine fail
 
@@ -199,6 +265,8 @@ contains
     whole = real(now - run%loop_start, wp) / real(rate, wp)
     write (line, '(a,f10.3,a,i0)') 'time loop ', whole, ' s, steps ', &
       run%clock%step - run%checkpoint%clock%step
+    if (run%model%at_equilibrium) line = trim(line)//', evaluations of the forces '// &
+      integer_text(run%increments%relaxation%moves + run%clock%step - run%checkpoint%clock%step)
     call record_line(run%record, trim(line), errors)
     write (line, '(a,9(2x,a,f9.3))') 'kernels [s] ', &
       (trim(kernel_names(k)), run%timing%seconds(k), k=1, size(kernel_names)), 'frames', &

@@ -8,8 +8,10 @@ program perigeo
   use pd_command_line, only: options_t, read_command_line
   use pd_errors, only: error_list_t, exit_command_line, outcome_t
   use pd_exit, only: leave
+  use pd_increment, only: take_increment
   use pd_run, only: open_outputs, run_t, set_up_run
-  use pd_run_steps, only: due_after_next_step, due_t, finish_run, write_what_is_due
+  use pd_run_steps, only: due_after_step, due_t, end_without_equilibrium, finish_run, &
+    write_what_is_due
   use pd_step, only: take_step
   use pd_system, only: catch_signals
   implicit none
@@ -30,9 +32,17 @@ program perigeo
   call catch_signals()
   if (.not. outcome%done) call open_outputs(options, run, outcome)
   do while (.not. outcome%done .and. .not. run%schedule%is_over(run%clock))
-    due = due_after_next_step(run)
-    call take_step(run%clock, due%anything, run%model, run%state, run%work, run%ledger, &
-      run%timing, failed_row)
+    if (run%model%at_equilibrium) then
+      call take_increment(run%clock, run%schedule, run%model, run%state, run%increments, &
+        run%ledger, run%timing)
+      due = due_after_step(run%clock%step, run)
+      failed_row = 0
+      if (run%increments%lost) call end_without_equilibrium(run, outcome)
+    else
+      due = due_after_step(run%clock%step + 1, run)
+      call take_step(run%clock, due%anything, run%model, run%state, run%work, run%ledger, &
+        run%timing, failed_row)
+    end if
     call write_what_is_due(due, failed_row, run, outcome)
   end do
   if (.not. outcome%done) call finish_run(run, outcome)

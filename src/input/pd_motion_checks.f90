@@ -210,6 +210,7 @@ contains
     type(namelist_group_t), intent(in)    :: group
     type(error_list_t),     intent(inout) :: errors
     real(wp), parameter :: max_steps = 2.0e9_wp
+    character(*), parameter :: without = 'without method = ''equilibrium'''
 
     if (group%line == 0) return   ! the group is missing, and that has been reported
     associate (t => input%integration)
@@ -221,6 +222,13 @@ contains
         call errors%add('the end of the run is missing', where=place_of(group), &
                         allowed='end_time [s] or final_strain')
       end if
+      if (t%method == 'equilibrium') then
+        call check_equilibrium(group, errors)
+        return
+      end if
+      call add_useless(group, 'residual', without, errors)
+      call add_useless(group, 'increments', without, errors)
+      call add_useless(group, 'relaxation', without, errors)
       if (t%time_step_rule == 'fixed') then
         if (.not. is_given(group, 'time_step')) &
           call add_missing(group, 'time_step', 'for time_step_rule = ''fixed''', errors)
@@ -244,6 +252,19 @@ contains
       end if
     end associate
   end subroutine check_integration
+
+  !> What equilibrium has no use for.
+  subroutine check_equilibrium(group, errors)
+    type(namelist_group_t), intent(in)    :: group
+    type(error_list_t),     intent(inout) :: errors
+    character(*), parameter :: keys(5) = [character(14) :: 'time_step_rule', 'time_step', &
+                                          'safety', 'damping', 'damping_frame']
+    integer :: k
+
+    do k = 1, size(keys)
+      call add_useless(group, trim(keys(k)), 'with method = ''equilibrium''', errors)
+    end do
+  end subroutine check_equilibrium
 
   !> Everything that needs platens, and whether they approach each other.
   subroutine check_platens(input, groups, errors)

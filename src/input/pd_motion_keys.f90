@@ -26,6 +26,10 @@ module pd_motion_keys
     real(wp) :: safety = 0.9_wp
     real(wp) :: damping = 0.0_wp                       !! C [kg/(m^3 s)]
     character(:), allocatable :: damping_frame
+    character(:), allocatable :: method
+    real(wp) :: residual = 1.0e-4_wp
+    integer  :: increments = 200
+    character(:), allocatable :: relaxation
   contains
     procedure :: visit => visit_integration
   end type integration_input_t
@@ -80,6 +84,20 @@ contains
       meaning='rest: damping against rest, the body starts at rest; platens: against the ' &
       //'affine velocity between the platens, with which the body also starts'), &
       self%damping_frame)
+    call visitor%text_key(key_t('method', default='verlet', choices='verlet equilibrium', &
+      meaning='verlet: motion in time; equilibrium: increments of load and motion, each ' &
+      //'brought to rest'), self%method)
+    call visitor%real_key(key_t('residual', unit='1', default='1.0e-4', needs_effect=.true., &
+      range=range_t(0.0_wp, 1.0e-2_wp, .true., .false.), also='only for equilibrium', &
+      meaning='unbalanced force at rest, over reactions and loads'), self%residual)
+    call visitor%integer_key(key_t('increments', unit='1', default='200', needs_effect=.true., &
+      range=positive, also='only for equilibrium', &
+      meaning='of the run, where none is hard; shorter ones follow where they are'), &
+      self%increments)
+    call visitor%text_key(key_t('relaxation', default='adaptive', needs_effect=.true., &
+      choices='adaptive kinetic local accelerated', also='only for equilibrium', &
+      meaning='way to rest: adaptive dynamic relaxation, kinetic damping, local damping, ' &
+      //'accelerated gradient'), self%relaxation)
   end subroutine visit_integration
 
 end module pd_motion_keys

@@ -22,7 +22,7 @@ module pd_loaded_platen
   type, extends(support_t) :: loaded_platen_t
     logical,  private :: as_one(2) = .false.             !! components in which it is rigid
     real(wp), private :: traction(2) = 0.0_wp            !! from outside, at full load [Pa]
-    real(wp), private :: applied(2) = 0.0_wp             !! F, the same over its length [N/m]
+    real(wp), private :: full(2) = 0.0_wp                !! F, the same over its length [N/m]
     type(table_t), private :: factor                     !! r
     real(wp), private :: ramp_time = 0.0_wp              !! [s]
   contains
@@ -31,6 +31,7 @@ module pd_loaded_platen
     procedure :: share_forces
     procedure :: take_reactions
     procedure :: work
+    procedure :: applied => applied_at
     procedure :: description
   end type loaded_platen_t
 
@@ -51,7 +52,7 @@ contains
     allocate (platen%points(size(set%points)), source=set%points)
     platen%as_one = as_one
     platen%traction = traction
-    platen%applied = merge(traction * length, 0.0_wp, as_one)
+    platen%full = merge(traction * length, 0.0_wp, as_one)
     platen%ramp_time = ramp_time
     platen%factor = new_ramp(ramp_time)
   end function new_loaded_platen
@@ -82,7 +83,7 @@ contains
     integer :: c
 
     do c = 1, 2
-      if (self%as_one(c)) call share(self%points, self%factor%rate(t) * self%applied(c), volume, &
+      if (self%as_one(c)) call share(self%points, self%factor%rate(t) * self%full(c), volume, &
         f(:, c))
     end do
   end subroutine share_forces
@@ -104,7 +105,7 @@ contains
     real(wp),               intent(in)    :: volume(:), t, f(:, :)
 
     self%force = merge(reaction(self%points, volume, f), 0.0_wp, self%as_one) &
-      + self%factor%rate(t) * self%applied
+      + self%factor%rate(t) * self%full
   end subroutine take_reactions
 
   !> Work of the applied force on the motion of the platen.
@@ -116,16 +117,24 @@ contains
     work = 0.0_wp
     do c = 1, 2
       if (self%as_one(c)) work = work + (t_next - t) * 0.5_wp * (self%factor%rate(t) &
-        + self%factor%rate(t_next)) * self%applied(c) * v(self%points(1), c)
+        + self%factor%rate(t_next)) * self%full(c) * v(self%points(1), c)
     end do
   end function work
+
+  pure function applied_at(self, t) result(force)
+    class(loaded_platen_t), intent(in) :: self
+    real(wp),               intent(in) :: t
+    real(wp) :: force(2)
+
+    force = self%factor%rate(t) * self%full
+  end function applied_at
 
   pure function description(self) result(text)
     class(loaded_platen_t), intent(in) :: self
     character(:), allocatable :: text
 
     text = short_number(self%traction(1))//', '//short_number(self%traction(2))//' Pa on '// &
-      self%name//': '//short_number(self%applied(1))//', '//short_number(self%applied(2))// &
+      self%name//': '//short_number(self%full(1))//', '//short_number(self%full(2))// &
       ' N/m in all'
     if (self%ramp_time > 0.0_wp) text = text//', whole from '//short_number(self%ramp_time)//' s'
   end function description

@@ -25,6 +25,7 @@ module pd_supports
     procedure(work),            deferred :: work
     procedure :: share_forces => share_nothing
     procedure :: common_velocity => no_common_velocity
+    procedure :: applied => nothing_applied
     procedure :: description => nothing_to_say
   end type support_t
 
@@ -120,6 +121,17 @@ contains
     end associate
     if (allocated(velocity%times)) deallocate (velocity%times)
   end function no_common_velocity
+
+  !> Force from outside on the points of the support at time t, where it includes a load [N/m].
+  pure function nothing_applied(self, t) result(force)
+    class(support_t), intent(in) :: self
+    real(wp),         intent(in) :: t                 !! [s]
+    real(wp) :: force(2)
+
+    associate (unused => self, unused_t => t)
+    end associate
+    force = 0.0_wp
+  end function nothing_applied
 
   !> What `--check` says about the load on a support; '' if there is none.
   pure function nothing_to_say(self) result(text)

@@ -92,6 +92,7 @@ contains
     hi = operators%domain%blocks%hi(block)
     work%dissipated(block) = 0.0_wp
     work%relaxed(block) = 0.0_wp
+    work%flowed(block) = 0
     if (timed) work%times(1, block) = now()
     call operators%gradient_block(lo, hi, state%displacement, state%displacement_gradient)
     if (timed) work%times(2, block) = now()
@@ -99,6 +100,7 @@ contains
     if (work%failed(block) == 0) then
       call materials%stress_block(block, state%displacement_gradient, state%law_points_t, p, flow)
       work%dissipated(block) = flow%work(volume)
+      work%flowed(block) = flow%n
       call operators%relax_block(block, state%displacement, state%displacement_gradient, flow, &
         state%control_memory, p, work%relaxed(block))
       call operators%hand_over_block(lo, hi, state%displacement_gradient, p)

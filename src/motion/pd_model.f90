@@ -30,6 +30,7 @@ module pd_model
     real(wp) :: spacing = 0.0_wp             !! dx [m]
     real(wp) :: delta = 0.0_wp               !! horizon [m]
     real(wp) :: damping = 0.0_wp             !! C [kg/(m^3 s)]
+    logical  :: at_equilibrium = .false.     !! time only tells how far loads and supports are
     logical  :: damped_in_frame = .false.    !! damping acts in the frame of the platens
     real(wp) :: highest_frequency = 0.0_wp   !! of the linearised operator [1/s]; 0: not asked for
     real(wp) :: unbalanced = -1.0_wp         !! largest |N_i| / sqrt(V_i) inside a cloud of points;

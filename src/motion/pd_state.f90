@@ -35,6 +35,7 @@ module pd_state
     real(wp), allocatable :: dissipated(:)    !! work of S on dE^p (blocks) [J/m]
     real(wp), allocatable :: relaxed(:)       !! dissipated by the relaxing control (blocks) [J/m]
     integer,  allocatable :: failed(:)        !! first row with det F <= 0, 0: none (blocks)
+    integer,  allocatable :: flowed(:)        !! rows that flow in this step (blocks)
     real(wp), allocatable :: times(:, :)      !! clock at the ends of kernels (3,blocks) [s]
   contains
     procedure :: fit
@@ -49,11 +50,11 @@ contains
 
     if (allocated(self%failed)) then
       if (size(self%failed) == blocks%count) return
-      deallocate (self%damping, self%dissipated, self%relaxed, self%failed, self%times)
+      deallocate (self%damping, self%dissipated, self%relaxed, self%failed, self%flowed, self%times)
     end if
     allocate (self%damping(4, blocks%count), self%dissipated(blocks%count), &
       self%relaxed(blocks%count), self%times(3, blocks%count), source=0.0_wp)
-    allocate (self%failed(blocks%count), source=0)
+    allocate (self%failed(blocks%count), self%flowed(blocks%count), source=0)
   end subroutine fit
 
   !> Show all fields to a visitor.

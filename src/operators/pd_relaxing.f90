@@ -39,12 +39,17 @@ module pd_relaxing
     real(wp), allocatable :: inverse_weight(:)   !! 1 / W~ (n) [1/m^2]
     real(wp), allocatable :: moment(:, :)        !! s~ (n,2) [m^3]
     real(wp), allocatable :: pull(:, :)          !! g, weighed (n,2) [Pa/m^3]
+    !> Part of the springs that is kept as it follows the flow, on the way to equilibrium (n); not
+    !> allocated: it is that of the flow.
+    real(wp), allocatable, private :: following(:)
+    real(wp), private :: rate = 1.0_wp           !! how fast it follows
   contains
     procedure :: look_at_rows
     procedure :: relax_rows
     procedure :: hold_rows
     procedure :: join_rows
     procedure :: stored
+    procedure :: follow
   end type relaxing_t
 
   !> The springs of one block; row 1 is the first row of the block.
@@ -141,7 +146,7 @@ contains
   !> The work of the force in a step is that of the mean of Q_n and Q_{n+1}, and so is its part that
   !> is dissipated: Q / c is remembered beside p.
   pure subroutine relax_rows(self, lo, hi, flow, rows, memory, dissipated)
-    class(relaxing_t), intent(in) :: self
+    class(relaxing_t), intent(inout) :: self
     integer,         intent(in)    :: lo, hi
     type(flow_t),    intent(in)    :: flow               !! of these rows
     type(springs_t), intent(inout) :: rows               !! gets q
@@ -157,6 +162,11 @@ contains
       kept(flow%rows(k) - lo + 1) = flow%strength(k) / max(tiny(1.0_wp), &
         flow%strength(k) + self%clock(flow%rows(k)) * flow%increment(k))
     end do
+    if (allocated(self%following)) then
+      self%following(lo:hi) = self%following(lo:hi) &
+        + self%rate * (kept(:hi - lo + 1) - self%following(lo:hi))
+      kept(:hi - lo + 1) = self%following(lo:hi)
+    end if
     !$omp simd simdlen(8) private(b, e1, e2, p1, p2)
     do i = lo, hi
       b = i - lo + 1
@@ -177,6 +187,17 @@ contains
     end do
     dissipated = block_sum(work)
   end subroutine relax_rows
+
+  !> From now on the part of the springs that is kept follows the flow: at every look by this part
+  !> of what is missing. 1: at once, 0: it stays.
+  subroutine follow(self, rate)
+    class(relaxing_t), intent(inout) :: self
+    real(wp),          intent(in)    :: rate
+
+    if (.not. allocated(self%following)) &
+      allocate (self%following(size(self%stiffness)), source=1.0_wp)
+    self%rate = rate
+  end subroutine follow
 
   !> q = c h of rows lo to hi: a small displacement of a body that has never flowed.
   pure subroutine hold_rows(self, lo, hi, rows)

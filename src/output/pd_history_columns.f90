@@ -8,6 +8,7 @@ module pd_history_columns
   use pd_model, only: model_t
   use pd_observe, only: block_view_t, column_t, largest, mean, row_view_t, smallest, &
     surplus, total
+  use pd_unbalanced, only: over
   implicit none
   private
 
@@ -59,6 +60,10 @@ contains
       part=plastic_heat))
     call add(columns, column_t('min_det_f', '1', 'smallest det F, volume over that of the '// &
       'undeformed body,'//in_body, joined=smallest, part=det_f))
+    call add(columns, column_t('unbalanced_force', '1', 'sum of the net forces on what is free '// &
+      'to move, over reactions and loads', value=unbalanced_force))
+    call add(columns, column_t('damping_share', '1', 'sum of the forces of the damping, over '// &
+      'reactions and loads', value=damping_share))
   end subroutine history_columns
 
   subroutine add(columns, column)
@@ -149,6 +154,8 @@ contains
     type(block_view_t), intent(in) :: block
     real(wp) :: terms(n_block), density(n_block)
 
+    part = 0.0_wp
+    if (block%model%at_equilibrium) return   ! velocity is that of a time without meaning
     if (block%hi - block%lo + 1 < n_block) terms = 0.0_wp
     density = 0.0_wp
     call block%model%materials%density_block(block%number, density)
@@ -252,6 +259,20 @@ contains
 
     value = row%moment%ledger%external_work(row%model%blocks)
   end function external_work
+
+  pure real(wp) function unbalanced_force(row) result(value)
+    type(row_view_t), intent(in) :: row
+
+    value = over(row%unbalanced%free, row%unbalanced%outside)
+  end function unbalanced_force
+
+  pure real(wp) function damping_share(row) result(value)
+    type(row_view_t), intent(in) :: row
+
+    value = 0.0_wp   ! nothing is loaded yet
+    if (row%unbalanced%outside > 0.0_wp) &
+      value = over(row%unbalanced%damping, row%unbalanced%outside)
+  end function damping_share
 
   pure real(wp) function energy_error(row) result(value)
     type(row_view_t), intent(in) :: row

@@ -12,6 +12,7 @@ module pd_observe
   use pd_model, only: model_t
   use pd_platens, only: nominal_strain
   use pd_state, only: state_t
+  use pd_unbalanced, only: look_at_forces, unbalanced_t
   implicit none
   private
 
@@ -58,6 +59,7 @@ module pd_observe
     type(model_t), pointer :: model => null()
     type(moment_t) :: moment
     type(observation_t) :: seen                 !! columns from blocks, and those before this one
+    type(unbalanced_t) :: unbalanced            !! forces
     real(wp) :: control_energy = 0.0_wp         !! stored in the control [J/m]
     integer  :: boundary = 0, component = 0     !! that the column is about
   end type row_view_t
@@ -118,6 +120,7 @@ contains
     call model%operators%relaxing_energy(state%displacement, state%displacement_gradient, &
       state%control_memory, held)
     row%control_energy = row%control_energy + held
+    call look_at_forces(model, state, moment%time, row%unbalanced)
     allocate (row%seen%names(size(columns)), source=columns%name)
     allocate (row%seen%values(size(columns)), source=ieee_value(1.0_wp, ieee_quiet_nan))
     call observe_blocks(columns, model, state, row%seen%values)

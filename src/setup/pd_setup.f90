@@ -28,6 +28,7 @@ contains
     type(error_list_t), intent(inout) :: errors
     type(horizon_t) :: horizon
 
+    model%at_equilibrium = input%integration%method == 'equilibrium'
     model%spacing = input%discretisation%spacing
     model%delta = input%discretisation%horizon
     horizon = new_horizon(model%delta, input%discretisation%influence)
@@ -80,7 +81,8 @@ contains
       model%points%place = min(1.0_wp, max(0.0_wp, (model%points%position(:, p%axis) - p%start) &
         / p%length))
     end associate
-    model%damped_in_frame = input%integration%damping_frame == 'platens'
+    model%damped_in_frame = model%at_equilibrium &   ! the first guess moves with the platens
+      .or. input%integration%damping_frame == 'platens'
   end subroutine set_up_damping
 
 end module pd_setup

@@ -38,6 +38,7 @@ contains
     n = size(model%points%volume)
     allocate (density(n), source=model%materials%density_of(n))
     allocate (mass(n), source=density * model%points%volume)
+    if (model%at_equilibrium) mass = 0.0_wp   ! nothing has kinetic energy
     allocate (model%supports%items(size(input%boundaries)))
     do k = 1, size(input%boundaries)
       call new_support(input%boundaries, k, mass, model, model%supports%items(k)%support)

@@ -2,7 +2,7 @@
 module pd_setup_schedule
   use pd_clock, only: clock_t
   use pd_errors, only: error_list_t
-  use pd_input_types, only: input_t
+  use pd_input_types, only: input_t, integration_input_t
   use pd_kinds, only: is_set, wp
   use pd_model, only: model_t
   use pd_platens, only: time_of_strain
@@ -29,20 +29,11 @@ contains
     real(wp) :: end_time
     integer  :: k
 
-    associate (given => input%integration, dt => clock%time_step)
-      if (dt <= 0.0_wp) then
-        if (given%time_step_rule == 'fixed') then
-          dt = given%time_step
-        else if (given%time_step_rule == 'courant') then
-          dt = given%safety * model%spacing / model%materials%wave_speed()
-        else if (given%time_step_rule == 'spectral') then
-          call find_highest_frequency(model)
-          dt = given%safety * 2.0_wp / model%highest_frequency
-        end if
-      end if
-      end_time = given%end_time
-      if (is_set(given%final_strain)) end_time = strain_time(given%final_strain)
-    end associate
+    end_time = input%integration%end_time
+    if (is_set(input%integration%final_strain)) &
+      end_time = strain_time(input%integration%final_strain)
+    if (errors%count() > 0) return
+    call choose_time_step(input%integration, end_time, model, clock%time_step)
 
     associate (given => input%output)
       if (size(given%frame_strains) > 0) then
@@ -81,5 +72,27 @@ contains
     end function strain_time
 
   end subroutine set_up_schedule
+
+  !> Time step by the rule of the input, or the longest increment on the way of equilibrium, unless
+  !> it is known.
+  subroutine choose_time_step(given, end_time, model, dt)
+    type(integration_input_t), intent(in)    :: given
+    real(wp),                  intent(in)    :: end_time   !! [s]
+    type(model_t),             intent(inout) :: model
+    real(wp),                  intent(inout) :: dt         !! in: 0, or that of a checkpoint [s]
+
+    if (given%method == 'equilibrium') call find_highest_frequency(model)
+    if (dt > 0.0_wp) return
+    if (given%method == 'equilibrium') then
+      dt = end_time / real(given%increments, wp)
+    else if (given%time_step_rule == 'fixed') then
+      dt = given%time_step
+    else if (given%time_step_rule == 'courant') then
+      dt = given%safety * model%spacing / model%materials%wave_speed()
+    else if (given%time_step_rule == 'spectral') then
+      call find_highest_frequency(model)
+      dt = given%safety * 2.0_wp / model%highest_frequency
+    end if
+  end subroutine choose_time_step
 
 end module pd_setup_schedule

@@ -1,0 +1,189 @@
+!> Increments of load or motion, each brought to equilibrium.
+!>
+!> Time tells how far loads and supports have gone, and nothing else: there is no inertia and no
+!> damping. An increment begins with a guess, the motion of the last one going on, and relaxes.
+!> Where the body does not come to rest, the increment is halved; where it does so slowly, the next
+!> one is shorter, where quickly, longer. Increments end at the times of frames.
+!>
+!> Velocity is the displacement of the increment over its time. Where no equilibrium is near, as
+!> when a band breaks through, the relaxation follows the jump to the next one. Energy that the way
+!> to equilibrium takes out of the body is entered as work of a damping.
+!> Source: doc/theory.md, section 6.
+module pd_increment
+  use pd_clock, only: clock_t
+  use pd_forces, only: forces
+  use pd_kinds, only: wp
+  use pd_ledger, only: ledger_t
+  use pd_model, only: model_t
+  use pd_relaxation, only: keep_start, relax, relaxation_t, relaxed_t, new_relaxation, &
+    return_to_start
+  use pd_schedule, only: schedule_t
+  use pd_state, only: state_t
+  use pd_timing, only: timing_t
+  use pd_unbalanced, only: loads_at
+  implicit none
+  private
+
+  public :: increments_t, new_increments, take_increment
+
+  !> How increments follow each other.
+  type :: increments_t
+    real(wp) :: longest = 0.0_wp       !! [s]
+    real(wp) :: shortest = 0.0_wp      !! [s]
+    type(relaxation_t) :: relaxation
+    type(relaxed_t)    :: last         !! what came of the last one
+    integer :: unfinished = 0          !! increments that were taken without being at rest
+    logical :: lost = .false.          !! the last one did not come to rest, and was not taken
+    logical :: under_load = .false.    !! loads grow in the last one
+  end type increments_t
+
+  !> Up to this residual an increment of the shortest length is taken although it is not at rest.
+  real(wp), parameter :: most_residual = 1.0e-2_wp
+  !> An increment with fewer moves than the first is easy, with more than the second hard.
+  integer,  parameter :: easy = 400, hard = 4000
+
+contains
+
+  !> Increments of a run: so many, of the same length, where none is hard.
+  subroutine new_increments(model, count, rule, residual, schedule, clock, increments)
+    type(model_t),      intent(in)    :: model
+    integer,            intent(in)    :: count      !! of the run
+    character(*),       intent(in)    :: rule       !! of the relaxation
+    real(wp),           intent(in)    :: residual   !! unbalanced force over that from outside
+    type(schedule_t),   intent(inout) :: schedule
+    type(clock_t),      intent(inout) :: clock      !! of the state to go on from
+    type(increments_t), intent(out)   :: increments
+    real(wp), parameter :: shortest = 1.0_wp / 64.0_wp   ! of the longest
+
+    increments%longest = schedule%end_time / real(count, wp)
+    increments%shortest = shortest * increments%longest
+    call new_relaxation(model, rule, residual, increments%relaxation)
+    if (clock%step == 0) call choose_next(schedule, increments, clock)
+  end subroutine new_increments
+
+  !> One increment, from the time of the clock to the next; the clock may be set to a shorter one.
+  !>
+  !> Where none is found with the shortest increment it is `lost`, and the state is that before it.
+  !> A residual that is small all the same will do, but not while loads grow: beyond their limit the
+  !> body gives way ever more slowly, the shorter the increments are.
+  subroutine take_increment(clock, schedule, model, state, increments, ledger, timing)
+    type(clock_t),      intent(inout) :: clock
+    type(schedule_t),   intent(inout) :: schedule
+    type(model_t),      intent(inout) :: model          !! its supports get their new forces
+    type(state_t),      intent(inout) :: state
+    type(increments_t), intent(inout) :: increments
+    type(ledger_t),     intent(inout) :: ledger
+    type(timing_t),     intent(inout) :: timing
+    real(wp) :: t
+
+    associate (relaxation => increments%relaxation, last => increments%last)
+      t = clock%time()
+      call timing%begin(clock%step + 1)
+      call keep_start(relaxation, state)
+      do
+        call guess(model, t, clock%time_step, relaxation, state)
+        call relax(model, t + clock%time_step, state, relaxation, timing, last)
+        if (last%at_rest .or. clock%time_step <= increments%shortest) exit
+        call return_to_start(relaxation, state)
+        call set_increment(0.5_wp * clock%time_step, clock, schedule)
+      end do
+      increments%under_load = loads_at(model, t + clock%time_step) > loads_at(model, t)
+      increments%lost = .not. last%at_rest .and. (increments%under_load &
+        .or. last%failed_row > 0 .or. last%residual > most_residual)
+      if (increments%lost) then
+        call return_to_start(relaxation, state)
+        state%displacement = relaxation%displacement
+        return
+      end if
+      call clock%advance()
+      if (.not. last%at_rest) increments%unfinished = increments%unfinished + 1
+      call settle(model, t, clock%time_step, relaxation, state, timing)
+    end associate
+    call enter_work(t, clock%time_step, model, state, increments, ledger)
+    call choose_next(schedule, increments, clock)
+  end subroutine take_increment
+
+  !> First guess of the next equilibrium: the motion goes on.
+  subroutine guess(model, t, duration, relaxation, state)
+    type(model_t),      intent(in)    :: model
+    real(wp),           intent(in)    :: t, duration   !! [s]
+    type(relaxation_t), intent(in)    :: relaxation
+    type(state_t),      intent(inout) :: state
+
+    state%displacement = relaxation%displacement + duration * model%points%free * state%velocity
+    call model%supports%prescribe(t + duration, state%displacement, state%velocity)
+  end subroutine guess
+
+  !> The increment is over: stress and history go on from its start, once; so do the supports.
+  subroutine settle(model, t, duration, relaxation, state, timing)
+    type(model_t),      intent(inout) :: model
+    real(wp),           intent(in)    :: t, duration   !! [s]
+    type(relaxation_t), intent(inout) :: relaxation
+    type(state_t),      intent(inout) :: state
+    type(timing_t),     intent(inout) :: timing
+    integer :: failed_row
+
+    call return_to_start(relaxation, state)
+    if (allocated(model%operators%relaxing)) call model%operators%relaxing%follow(0.0_wp)
+    call forces(model, t + duration, state, relaxation%blocks, timing, failed_row)
+    state%velocity = (state%displacement - relaxation%displacement) / duration
+  end subroutine settle
+
+  !> Work of the increment. That of supports and loads follows from the forces at both ends; what
+  !> the forces have done on the way beyond that has left the body.
+  subroutine enter_work(t, duration, model, state, increments, ledger)
+    real(wp),           intent(in)    :: t, duration   !! [s]
+    type(model_t),      intent(in)    :: model
+    type(state_t),      intent(in)    :: state
+    type(increments_t), intent(in)    :: increments
+    type(ledger_t),     intent(inout) :: ledger
+    real(wp) :: work, held
+    integer  :: k
+
+    held = 0.0_wp
+    do k = 1, size(model%supports%items)
+      associate (support => model%supports%items(k)%support)
+        work = support%work(state%velocity, t, t + duration)
+        ledger%outer_work = ledger%outer_work + work
+        if (.not. allocated(support%load_kind)) held = held + work   ! loads are in the net forces
+      end associate
+    end do
+    ledger%outer_work = ledger%outer_work + model%loads%work(state%velocity, t, t + duration)
+    ledger%damping = ledger%damping + increments%last%work
+    ledger%damping(1) = ledger%damping(1) + held
+    ledger%plastic = ledger%plastic + increments%relaxation%blocks%dissipated
+    ledger%control = ledger%control + increments%relaxation%blocks%relaxed
+  end subroutine enter_work
+
+  !> Length of the next increment: a part of the time to the next frame, or to the end.
+  subroutine choose_next(schedule, increments, clock)
+    type(schedule_t),   intent(inout) :: schedule
+    type(increments_t), intent(in)    :: increments
+    type(clock_t),      intent(inout) :: clock
+    real(wp), parameter :: round_off = 1.0e-6_wp
+    real(wp) :: wish, left
+    integer  :: k
+
+    if (schedule%is_over(clock)) return
+    wish = clock%time_step
+    if (increments%last%moves > hard) wish = max(increments%shortest, 0.5_wp * wish)
+    if (increments%last%moves < easy) wish = min(increments%longest, 2.0_wp * wish)
+    left = schedule%end_time - clock%time()
+    do k = size(schedule%frame_times), 1, -1
+      if (schedule%frame_steps(k) > clock%step) left = schedule%frame_times(k) - clock%time()
+    end do
+    wish = left / real(max(1, ceiling(left / wish - round_off)), wp)
+    if (abs(wish - clock%time_step) > round_off * wish) call set_increment(wish, clock, schedule)
+  end subroutine choose_next
+
+  !> Increments of another length from the present step on.
+  subroutine set_increment(duration, clock, schedule)
+    real(wp),         intent(in)    :: duration   !! [s]
+    type(clock_t),    intent(inout) :: clock
+    type(schedule_t), intent(inout) :: schedule
+
+    call clock%change_step(duration)
+    call schedule%fit(clock)
+  end subroutine set_increment
+
+end module pd_increment
