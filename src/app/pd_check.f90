@@ -50,7 +50,8 @@ contains
     integer :: i
 
     call find_highest_frequency(run%model)
-    if (run%clock%time_step * run%model%highest_frequency > 2.0_wp) call run%warnings%add( &
+    if (.not. run%model%at_equilibrium .and. &
+      run%clock%time_step * run%model%highest_frequency > 2.0_wp) call run%warnings%add( &
       'the time step is larger than the stable one: the run will not last', '&integration')
     summary = summarise(run%input, run%model, run%clock, run%schedule)
     write (output_unit, '(a)') path//': the input is right'

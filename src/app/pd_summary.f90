@@ -7,6 +7,7 @@ module pd_summary
   use pd_kinds, only: is_set, wp
   use pd_model, only: model_t
   use pd_random_field, only: spread_of, spread_t
+  use pd_relaxation, only: numbers_per_row
   use pd_schedule, only: schedule_t
   use pd_state, only: state_t
   use pd_text, only: number => short_number, whole => integer_text
@@ -50,9 +51,7 @@ contains
     type(clock_t),    intent(in) :: clock
     type(schedule_t), intent(in) :: schedule
     type(summary_t) :: summary
-    character(:), allocatable :: text
-    integer  :: fewest, point
-    real(wp) :: courant
+    integer :: fewest, point
 
     associate (body => model%body, bonds => real(model%operators%bonds(), wp))
       call summary%add('title', input%run%title)
@@ -71,15 +70,15 @@ contains
         number(model%spacing)//' m: m = '//number(model%delta / model%spacing))
       call summary%add('wave speed', 'c_p = '//number(model%materials%wave_speed())//' m/s')
       call add_field(input, model, summary)
-      courant = model%spacing / model%materials%wave_speed()
-      text = number(clock%time_step)//' s = '//number(clock%time_step / courant)// &
-        ' dx/c_p, rule '//input%integration%time_step_rule
-      if (input%integration%time_step_rule /= 'fixed') &
-        text = text//', safety '//number(input%integration%safety)
-      call summary%add('time step', text)
-      if (model%highest_frequency > 0.0_wp) call summary%add('stable step', &
-        '2/omega_max = '//number(2.0_wp / model%highest_frequency)//' s, of the elastic body')
-      call summary%add('steps', whole(schedule%steps)//' to '//number(schedule%end_time)//' s')
+      if (model%at_equilibrium) then
+        call summary%add('equilibrium', 'residual '//number(input%integration%residual)// &
+          ' of reactions and loads, relaxation '//input%integration%relaxation)
+        call summary%add('increments', whole(input%integration%increments)//' to '// &
+          number(schedule%end_time)//' s, shorter ones where they are hard')
+      else
+        call add_time_step(input, model, clock, summary)
+        call summary%add('steps', whole(schedule%steps)//' to '//number(schedule%end_time)//' s')
+      end if
       associate (platens => model%platens, items => model%supports%items)
         if (platens%axis > 0) call summary%add('platens', items(platens%first)%support%name// &
           ' and '//items(platens%second)%support%name//', '//number(platens%length)//' m apart')
@@ -90,6 +89,25 @@ contains
       call summary%add('memory', number(memory(input, model) / 1.0e6_wp)//' MB')
     end associate
   end function summarise
+
+  !> The time step, its rule, and the stable one.
+  subroutine add_time_step(input, model, clock, summary)
+    type(input_t),   intent(in)    :: input
+    type(model_t),   intent(in)    :: model
+    type(clock_t),   intent(in)    :: clock
+    type(summary_t), intent(inout) :: summary
+    character(:), allocatable :: text
+    real(wp) :: courant
+
+    courant = model%spacing / model%materials%wave_speed()
+    text = number(clock%time_step)//' s = '//number(clock%time_step / courant)// &
+      ' dx/c_p, rule '//input%integration%time_step_rule
+    if (input%integration%time_step_rule /= 'fixed') &
+      text = text//', safety '//number(input%integration%safety)
+    call summary%add('time step', text)
+    if (model%highest_frequency > 0.0_wp) call summary%add('stable step', &
+      '2/omega_max = '//number(2.0_wp / model%highest_frequency)//' s, of the elastic body')
+  end subroutine add_time_step
 
   !> The random field, and its statistics in every material that yields.
   subroutine add_field(input, model, summary)
@@ -171,6 +189,7 @@ contains
 
     state%remembered = model%materials%remembered()
     numbers = state%numbers_per_point() + 7 + 3 + 4 + 5
+    if (model%at_equilibrium) numbers = numbers + numbers_per_row(state)
     if (input%output%checkpoint_every > 0.0_wp) numbers = numbers + 15
     memory = model%operators%memory() + real(model%operators%n, wp) * 8.0_wp * real(numbers, wp)
   end function memory
@@ -182,6 +201,8 @@ contains
     type(schedule_t), intent(in) :: schedule
     !> A step with radial return, motion and energies against one with the linear operator.
     real(wp), parameter :: whole_step = 1.5_wp
+    !> Evaluations of the forces that an increment takes until it is at rest, in soil that softens.
+    real(wp), parameter :: moves = 300.0_wp
     integer,  parameter :: repetitions = 5
     real(wp), allocatable :: u(:, :), h(:, :), f(:, :)
     integer(int64) :: start, finish, rate
@@ -197,6 +218,7 @@ contains
       seconds = min(seconds, real(finish - start, wp) / real(rate, wp))
     end do
     seconds = whole_step * seconds * real(schedule%steps, wp)
+    if (model%at_equilibrium) seconds = seconds * moves
   end function estimated_seconds
 
 end module pd_summary

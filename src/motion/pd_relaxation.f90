@@ -8,7 +8,8 @@
 !> 'adaptive': dynamic relaxation (Underwood 1983): a = (2 - q) / (2 + q), b = 2 / (2 + q), d = 1,
 !>   with the critical damping q of the frequency that the last move shows, its Rayleigh quotient
 !>   q^2 = 4 (w . -df) / (w . w / s), from the change df of the forces along it.
-!> 'kinetic': kinetic damping (Cundall 1976): a = b = d = 1; m = 0 where the kinetic energy falls.
+!> 'kinetic': kinetic damping (Cundall 1976): a = d = 1; where the kinetic energy falls, the body
+!>   goes back to where it was largest, and stops.
 !> 'local': local damping (Cundall 1987; FLAC): of every force 0.8 of its size acts against m.
 !> 'accelerated': accelerated gradient (Nesterov 1983), begun anew where it goes uphill
 !>   (O'Donoghue and Candes 2015).
@@ -30,8 +31,7 @@ module pd_relaxation
   private
 
   public :: relaxation_t, new_relaxation, relaxed_t, keep_start, return_to_start, relax
-
-  character(*), parameter, public :: relaxation_rules = 'adaptive kinetic local accelerated'
+  public :: numbers_per_row
 
   !> How to come to equilibrium, and work space.
   type :: relaxation_t
@@ -69,6 +69,7 @@ module pd_relaxation
   type :: move_t
     real(wp) :: a = 0.0_wp, b = 1.0_wp, c = 0.0_wp, d = 1.0_wp
     real(wp) :: against = 0.0_wp        !! part of |f| that acts against m
+    real(wp) :: back = 0.0_wp           !! half of b: back to where the body was fastest
   end type move_t
 
   !> What the rules remember from move to move.
@@ -76,6 +77,7 @@ module pd_relaxation
     real(wp) :: theta = 1.0_wp          !! of the accelerated gradient
     real(wp) :: momentum = 0.0_wp       !! its factor
     real(wp) :: kinetic = 0.0_wp        !! kinetic energy before
+    logical  :: resting = .true.        !! the body has been stopped
   end type pace_t
 
 contains
@@ -96,6 +98,13 @@ contains
     allocate (relaxation%step(n), source=4.0_wp &
       / (model%highest_frequency**2 * model%materials%density_of(n)))
   end subroutine new_relaxation
+
+  !> Numbers that the work space has in a row.
+  pure integer function numbers_per_row(state) result(numbers)
+    type(state_t), intent(in) :: state   !! whose columns of the history are known
+
+    numbers = 1 + 3 * 2 + 2 + 4 + size(state%remembered) + 4 + 2
+  end function numbers_per_row
 
   !> Remember the state at the start of an increment.
   subroutine keep_start(relaxation, state)
@@ -181,15 +190,22 @@ contains
     type(pace_t), intent(inout) :: pace
     type(move_t) :: move
     ! of the square of the stable step; without damping near it the fastest motion hides the others
-    real(wp), parameter :: safe = 0.81_wp, half = 0.5_wp
+    real(wp), parameter :: safe = 0.81_wp, slow = 0.36_wp
     real(wp), parameter :: most_damping = 1.8_wp, local_part = 0.8_wp
     real(wp) :: q, theta
 
     select case (rule)
     case ('kinetic')
-      move = move_t(a=1.0_wp, b=half)
-      if (sums(inertia) < pace%kinetic .and. k > 1) move = move_t(a=0.0_wp, b=0.5_wp * half)
-      pace%kinetic = merge(sums(inertia), 0.0_wp, k > 1 .and. move%a > 0.0_wp)
+      if (pace%resting) then
+        move = move_t(a=0.0_wp, b=0.5_wp * slow)
+        pace = pace_t(resting=.false.)
+      else if (sums(inertia) < pace%kinetic) then
+        move = move_t(a=0.0_wp, b=0.0_wp, back=0.5_wp * slow)
+        pace = pace_t()
+      else
+        move = move_t(a=1.0_wp, b=slow)
+        pace%kinetic = sums(inertia)
+      end if
     case ('local')
       move = move_t(a=1.0_wp, b=0.25_wp, against=local_part)
     case ('accelerated')
@@ -297,8 +313,10 @@ contains
           push = f(i, c) - merge(sign(move%against * f(i, c), m(i, c)), 0.0_wp, &
             abs(m(i, c)) > 0.0_wp)
           push = free(i, c) * s(i) * push
+          w(i, c) = merge(move%back * free(i, c) * s(i) * before(i, c) - 1.5_wp * m(i, c), 0.0_wp, &
+            move%back > 0.0_wp)
           m(i, c) = move%a * m(i, c) + move%b * push
-          w(i, c) = move%c * push + move%d * m(i, c)
+          w(i, c) = w(i, c) + move%c * push + move%d * m(i, c)
           u(i, c) = u(i, c) + w(i, c)
           before(i, c) = f(i, c)
         end do

@@ -27,7 +27,7 @@ contains
     allocate (columns(0))
     call add(columns, column_t('step', '1', 'number of the step', whole_number=.true., &
       value=step))
-    call add(columns, column_t('time', 's', 'step times time step', value=time))
+    call add(columns, column_t('time', 's', 'time of the step', value=time))
     if (model%platens%axis > 0) call add(columns, column_t('strain', '1', &
       'nominal strain between the platens, compression positive', value=strain))
     do k = 1, size(model%supports%items)
