@@ -238,7 +238,14 @@ class Planner:
                 line = (first, second)
         except ExpressionError as error:
             self.problems.add(at("line"), str(error))
-        return State(strain=strain, line=line)
+        sampled = None
+        try:
+            sampled = _number(_valued(level.sampled, parameters))
+            if sampled is not None and sampled <= 0.0:
+                raise ExpressionError(f"must be above 0, not {sampled:g}")
+        except ExpressionError as error:
+            self.problems.add(at("sampled"), str(error))
+        return State(strain=strain, line=line, sampled=sampled)
 
     def _take_files(self, values: Values) -> dict[str, Path]:
         """Files of points go beside the input of the run."""
