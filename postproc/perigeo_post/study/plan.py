@@ -20,7 +20,7 @@ from .toml import Key, Problems
 from .types import State, Value
 
 MOST_RUNS = 1000
-LONGEST_ID = 60
+LONGEST_ID = 48  # of the program too
 CHECKPOINT_SECONDS = 60.0  # between checkpoints, where neither base nor study says
 
 _NOT_THE_MODEL = (*OF_THE_STUDY, "run.title", "output.checkpoint_every")
