@@ -21,6 +21,7 @@ module pd_run
   use pd_setup_schedule, only: set_up_schedule
   use pd_state, only: state_t
   use pd_step, only: step_work_t
+  use pd_step_limit, only: new_step_limit, step_limit_t
   use pd_summary, only: summarise, summary_t
   use pd_timing, only: timing_t
   use pd_version, only: build_flags, code_version, git_hash
@@ -34,6 +35,7 @@ module pd_run
     type(model_t)      :: model
     type(schedule_t)   :: schedule
     type(clock_t)      :: clock
+    type(step_limit_t) :: limit
     type(state_t)      :: state
     type(ledger_t)     :: ledger
     type(step_work_t)  :: work
@@ -43,6 +45,7 @@ module pd_run
     type(error_list_t) :: warnings
     logical :: doubted = .false.              !! the energy balance has been warned of
     logical :: control_doubted = .false.      !! the part of the control in the work, too
+    logical :: step_doubted = .false.         !! the time step that the user has fixed, too
     integer(int64) :: last_checkpoint = 0     !! count of the system clock
     integer(int64) :: loop_start = 0          !! count of the system clock
   end type run_t
@@ -86,7 +89,10 @@ contains
       if (outcome%done) return
     end if
     run%clock = run%checkpoint%clock
+    run%limit = run%checkpoint%limit
     call set_up_schedule(run%input, run%clock, run%model, run%schedule, errors)
+    if (run%checkpoint%history_rows == 0) &
+      run%limit = new_step_limit(run%model%highest_frequency, run%clock%time_step)
     call outcome%end_if_any(errors, exit_input)
     if (.not. outcome%done .and. .not. options%check) call begin_state(run)
   end subroutine set_up_run

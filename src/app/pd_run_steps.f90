@@ -16,16 +16,81 @@ module pd_run_steps
   implicit none
   private
 
-  public :: due_t, due_after_next_step, write_what_is_due, finish_run
+  public :: due_t, look_at_time_step, due_after_next_step, write_what_is_due, finish_run
 
   !> What is written after a step. This is known before the step: only then must its state be whole.
   type :: due_t
     logical :: row = .false., frame = .false., checkpoint = .false.
     logical :: stop = .false.      !! a signal came
-    logical :: anything = .false.  !! the state will be looked at
+    logical :: anything = .false.  !! something is written: the state will be observed
+    logical :: whole = .false.     !! the state will be looked at
   end type due_t
 
 contains
+
+  !> Before a step: make it shorter if the body has strained so much that it is too long by now. A
+  !> step that the user has fixed is only doubted, once.
+  subroutine look_at_time_step(run, outcome)
+    type(run_t),     intent(inout) :: run
+    type(outcome_t), intent(inout) :: outcome
+    real(wp), parameter :: courant_safety = 0.9_wp   ! that of the input is of another limit
+    type(error_list_t) :: errors
+    logical :: found
+
+    if (.not. run%limit%look_due(run%clock%step)) return
+    call run%limit%look(run%model, run%state, run%clock, &
+      run%ledger%plastic_dissipation(run%model%blocks), found)
+    if (found) then
+      associate (given => run%input%integration)
+        if (given%time_step_rule == 'fixed') then
+          call doubt_time_step(run, errors)
+        else if (given%time_step_rule == 'courant') then
+          call shorten_time_step(courant_safety, run, outcome, errors)
+        else
+          call shorten_time_step(given%safety, run, outcome, errors)
+        end if
+      end associate
+      call run%timing%lap(kernel_history)
+    end if
+    if (.not. outcome%done) call outcome%end_if_any(errors, exit_file)
+  end subroutine look_at_time_step
+
+  !> Go back to a part of the stable step where half of the margin is used up.
+  !> A body that goes on to collapse would have ever shorter steps: it has failed.
+  subroutine shorten_time_step(safety, run, outcome, errors)
+    real(wp),           intent(in)    :: safety
+    type(run_t),        intent(inout) :: run
+    type(outcome_t),    intent(inout) :: outcome
+    type(error_list_t), intent(inout) :: errors
+    real(wp), parameter :: most = 0.95_wp   ! or one would have to look all the time
+    real(wp) :: part, stable
+
+    part = min(safety, most)
+    stable = 2.0_wp / run%limit%frequency
+    if (run%clock%time_step <= 0.5_wp * (1.0_wp + part) * stable) return
+    if (part * stable < run%limit%shortest) then
+      call fail('the stable time step has fallen below a thousandth of the first one', &
+        fastest_row(run), run, outcome)
+      return
+    end if
+    call run%clock%change_step(part * stable)
+    call run%schedule%fit(run%clock)
+    call record_line(run%record, 'time step shortened to '//short_number(run%clock%time_step)// &
+      ' s at step '//integer_text(run%clock%step)//', time '//short_number(run%clock%time())// &
+      ' s: 2/omega_max of the deformed body is now '//short_number(stable)//' s', errors)
+  end subroutine shorten_time_step
+
+  !> Warn of a time step beyond the stable one.
+  subroutine doubt_time_step(run, errors)
+    type(run_t),        intent(inout) :: run
+    type(error_list_t), intent(inout) :: errors
+
+    if (run%step_doubted .or. run%clock%time_step * run%limit%frequency <= 2.0_wp) return
+    run%step_doubted = .true.
+    call record_line(run%record, 'warning: the time step is too long for the deformed body at '// &
+      'step '//integer_text(run%clock%step)//': 2/omega_max is now '// &
+      short_number(2.0_wp / run%limit%frequency)//' s; the rule spectral would shorten it', errors)
+  end subroutine doubt_time_step
 
   !> What is due after the next step. A signal that comes during a step takes effect after the next
   !> one.
@@ -47,6 +112,7 @@ contains
       end if
     end associate
     due%anything = due%row .or. due%frame .or. due%checkpoint
+    due%whole = due%anything .or. run%limit%look_due(step)
   end function due_after_next_step
 
   !> Write what is due, but check the state first: a run that gains energy has failed.
@@ -140,7 +206,8 @@ contains
       call record_frame(run%model, run%state, run%record, errors)
     end do
     if (.not. due%checkpoint) return
-    call save_checkpoint(run%model, run%state, run%ledger, run%clock, run%record, errors)
+    call save_checkpoint(run%model, run%state, run%ledger, run%clock, run%limit, &
+      run%record, errors)
     call system_clock(run%last_checkpoint)
   end subroutine write_frames_and_checkpoint
 
