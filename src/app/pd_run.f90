@@ -9,11 +9,13 @@ module pd_run
   use pd_history_columns, only: history_columns
   use pd_input, only: read_input
   use pd_input_types, only: input_t
+  use pd_kinds, only: wp
   use pd_ledger, only: ledger_t, new_ledger
   use pd_model, only: model_t, release_set_up, start
   use pd_observe, only: column_t, moment_at, observation_t, observe
   use pd_record, only: load_checkpoint, observe_state, open_record, record_frame, record_line, &
     record_progress, record_row, record_t, results_in_the_way, same_history, same_points
+  use pd_reversal, only: new_reversal, reversal_t
   use pd_run_description, only: provenance_t
   use pd_schedule, only: schedule_t
   use pd_setup, only: set_up_model
@@ -36,6 +38,7 @@ module pd_run
     type(schedule_t)   :: schedule
     type(clock_t)      :: clock
     type(step_limit_t) :: limit
+    type(reversal_t)   :: reversal
     type(state_t)      :: state
     type(ledger_t)     :: ledger
     type(step_work_t)  :: work
@@ -46,6 +49,7 @@ module pd_run
     logical :: doubted = .false.              !! the energy balance has been warned of
     logical :: control_doubted = .false.      !! the part of the control in the work, too
     logical :: step_doubted = .false.         !! the time step that the user has fixed, too
+    logical :: flow_doubted = .false.         !! flow that turns back, too
     integer(int64) :: last_checkpoint = 0     !! count of the system clock
     integer(int64) :: loop_start = 0          !! count of the system clock
   end type run_t
@@ -162,6 +166,8 @@ contains
         run%checkpoint%clock = run%clock
       end if
       call release_set_up(model)
+      run%reversal = new_reversal(model%materials, run%input%materials%kinematic_modulus < 0.0_wp, &
+        model%blocks)
     end associate
   end subroutine begin_state
 

@@ -38,6 +38,7 @@ contains
     logical :: found
 
     if (.not. run%limit%look_due(run%clock%step)) return
+    call look_at_flow(run, errors)
     call run%limit%look(run%model, run%state, run%clock, &
       run%ledger%plastic_dissipation(run%model%blocks), found)
     if (found) then
@@ -91,6 +92,25 @@ contains
       'step '//integer_text(run%clock%step)//': 2/omega_max is now '// &
       short_number(2.0_wp / run%limit%frequency)//' s; the rule spectral would shorten it', errors)
   end subroutine doubt_time_step
+
+  !> Flow that turns back meets a strength that kinematic softening has raised: told once, when it
+  !> has made more than a twentieth of the heat.
+  subroutine look_at_flow(run, errors)
+    type(run_t),        intent(inout) :: run
+    type(error_list_t), intent(inout) :: errors
+    real(wp), parameter :: sizeable = 0.05_wp
+
+    if (run%flow_doubted .or. .not. run%reversal%is_possible()) return
+    call run%reversal%look(run%model%materials, run%model%blocks, run%model%points%volume, &
+      run%state, run%ledger%plastic)
+    if (run%reversal%part() <= sizeable) return
+    run%flow_doubted = .true.
+    call record_line(run%record, 'warning: the flow turns back: at step '// &
+      integer_text(run%clock%step)//', '//short_number(100.0_wp * run%reversal%part())// &
+      ' % of the plastic heat is of flow against the back stress; kinematic softening makes '// &
+      'the material stronger backwards, up to 2 sigma_y - sigma_r; isotropic_modulus '// &
+      'does not', errors)
+  end subroutine look_at_flow
 
   !> What is due after the next step. A signal that comes during a step takes effect after the next
   !> one.
