@@ -9,7 +9,8 @@ program perigeo
   use pd_errors, only: error_list_t, exit_command_line, outcome_t
   use pd_exit, only: leave
   use pd_run, only: open_outputs, run_t, set_up_run
-  use pd_run_steps, only: due_after_next_step, due_t, finish_run, write_what_is_due
+  use pd_run_steps, only: due_after_next_step, due_t, finish_run, look_at_time_step, &
+    write_what_is_due
   use pd_step, only: take_step
   use pd_system, only: catch_signals
   implicit none
@@ -29,9 +30,11 @@ program perigeo
   if (options%check .and. .not. outcome%done) call print_check(options%input_path, run, outcome)
   call catch_signals()
   if (.not. outcome%done) call open_outputs(options, run, outcome)
-  do while (.not. outcome%done .and. run%clock%step < run%schedule%steps)
+  do while (.not. outcome%done .and. .not. run%schedule%is_over(run%clock))
+    call look_at_time_step(run, outcome)
+    if (outcome%done) exit
     due = due_after_next_step(run)
-    call take_step(run%clock, due%anything, run%model, run%state, run%work, run%ledger, &
+    call take_step(run%clock, due%whole, run%model, run%state, run%work, run%ledger, &
       run%timing, failed_row)
     call write_what_is_due(due, failed_row, run, outcome)
   end do

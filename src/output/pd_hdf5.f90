@@ -14,13 +14,13 @@ module pd_hdf5
   use pd_errors, only: error_list_t
   use pd_hdf5_attributes, only: read_attribute, write_attribute
   use pd_hdf5_file, only: characters, check, close_file, create_file, create_group, flush_file, &
-    hdf5_file_t, make_space, make_text_type, object_exists, open_file, text_of
+    hdf5_file_t, make_space, make_text_type, object_exists, open_file, remove_object, text_of
   use pd_kinds, only: wp
   implicit none
   private
 
   public :: hdf5_file_t, create_file, open_file, flush_file, close_file
-  public :: create_group, object_exists
+  public :: create_group, object_exists, remove_object
   public :: reserve_dataset, reserve_whole_numbers
   public :: write_dataset, overwrite_dataset, overwrite_rows, overwrite_part
   public :: read_dataset, read_rows

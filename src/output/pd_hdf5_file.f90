@@ -9,7 +9,7 @@ module pd_hdf5_file
     c_int, c_int64_t, c_loc, c_null_char, c_ptr
   use hdf5, only: h5eset_auto_f, h5f_acc_rdonly_f, h5f_acc_rdwr_f, h5f_acc_trunc_f, &
     h5f_scope_global_f, h5fclose_f, h5fcreate_f, h5fflush_f, h5fopen_f, h5gclose_f, h5gcreate_f, &
-    h5iis_valid_f, h5lexists_f, h5open_f, h5p_file_create_f, h5pclose_f, h5pcreate_f, &
+    h5iis_valid_f, h5ldelete_f, h5lexists_f, h5open_f, h5p_file_create_f, h5pclose_f, h5pcreate_f, &
     h5pset_userblock_f, h5s_scalar_f, h5screate_f, h5screate_simple_f, h5t_c_s1, &
     h5t_native_double, h5t_str_nullpad_f, h5tcopy_f, h5tset_cset_f, h5tset_size_f, &
     h5tset_strpad_f, hid_t, hsize_t, size_t
@@ -19,7 +19,7 @@ module pd_hdf5_file
   private
 
   public :: hdf5_file_t, create_file, open_file, flush_file, close_file
-  public :: create_group, object_exists
+  public :: create_group, object_exists, remove_object
   public :: check, make_space, make_text_type, characters, text_of
 
   !> A file that is open. It does nothing more once something has failed.
@@ -180,6 +180,18 @@ contains
       object_exists = object_exists .and. status >= 0
     end do
   end function object_exists
+
+  !> Remove a group or dataset.
+  subroutine remove_object(file, name, errors)
+    type(hdf5_file_t),  intent(inout) :: file
+    character(*),       intent(in)    :: name
+    type(error_list_t), intent(inout) :: errors
+    integer :: status
+
+    if (.not. file%is_good()) return
+    call h5ldelete_f(file%id, name, status)
+    call check(file, status, name//' cannot be removed', errors)
+  end subroutine remove_object
 
   !> A data space; the dimensions of Fortran are those that C sees, reversed.
   subroutine make_space(shape_seen, space, status)

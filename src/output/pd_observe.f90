@@ -25,6 +25,7 @@ module pd_observe
     real(wp) :: time = 0.0_wp                   !! [s]
     real(wp) :: strain = 0.0_wp                 !! nominal; 0 without platens
     type(ledger_t) :: ledger
+    real(wp) :: time_step = 0.0_wp              !! dt of the step that ends here [s]
   end type moment_t
 
   !> A block of rows lo to hi of the fields as the columns see it; row 1 of the arrays is row lo.
@@ -96,6 +97,7 @@ contains
     moment%time = clock%time()
     moment%strain = nominal_strain(model%platens, state%displacement)
     moment%ledger = ledger
+    moment%time_step = clock%time_step
   end function moment_at
 
   !> The values of all columns.

@@ -21,8 +21,9 @@ module pd_record
   use pd_result, only: add_row, create_result, finish_result, places_t, result_exists, result_t, &
     resume_result, write_failed_frame, write_frame, write_rows
   use pd_run_description, only: provenance_t, run_description_t
-  use pd_schedule, only: rows_due, schedule_t
+  use pd_schedule, only: schedule_t
   use pd_state, only: state_t
+  use pd_step_limit, only: step_limit_t
   implicit none
   private
 
@@ -83,15 +84,15 @@ contains
     if (restart) then
       call resume_result(record%result, record%stem, description, &
         places_t(checkpoint%frames_written, checkpoint%history_rows), &
-        places_t(count(schedule%frame_steps > checkpoint%clock%step), &
-        rows_due(schedule, checkpoint%clock%step)), checkpoint%clock%step, errors)
+        places_t(schedule%frames_left(checkpoint%clock%step), &
+        schedule%rows_left(checkpoint%clock%step)), checkpoint%clock%step, errors)
       if (errors%count() == 0) call resume_history(record%history, record%stem, record%columns, &
         checkpoint%history_rows, errors)
       record%frames = checkpoint%frames_written
     else
       ! the old checkpoints go last: until the new result is there a full disk must cost nothing
       call create_result(record%result, record%stem, description, &
-        places_t(size(schedule%frame_steps) + 1, rows_due(schedule, 0) + 1), errors)
+        places_t(schedule%frames_left(0) + 1, schedule%rows_left(0) + 1), errors)
       if (errors%count() == 0) call remove_checkpoints(record%stem, errors)
       if (errors%count() == 0) &
         call create_history(record%history, record%stem, record%columns, errors)
@@ -140,7 +141,7 @@ contains
     type(error_list_t), intent(inout) :: errors
 
     call close_history(record%history, errors)
-    if (errors%count() == 0) call finish_result(record%result, errors)
+    if (errors%count() == 0) call finish_result(record%result, record%moment, errors)
     call close_progress(record%progress, errors)
   end subroutine close_record
 
@@ -224,11 +225,12 @@ contains
   end subroutine record_line
 
   !> Write a checkpoint of the state after a step, but first the rows of the history before it.
-  subroutine save_checkpoint(model, state, ledger, clock, record, errors)
+  subroutine save_checkpoint(model, state, ledger, clock, limit, record, errors)
     type(model_t),      intent(in)    :: model
     type(state_t),      intent(inout) :: state   !! visited, not changed
     type(ledger_t),     intent(in)    :: ledger
     type(clock_t),      intent(in)    :: clock
+    type(step_limit_t), intent(in)    :: limit
     type(record_t),     intent(inout) :: record
     type(error_list_t), intent(inout) :: errors
     type(checkpoint_t) :: checkpoint
@@ -238,6 +240,7 @@ contains
     call write_rows(record%result, errors)
     if (errors%count() > before) return
     checkpoint%clock = clock
+    checkpoint%limit = limit
     checkpoint%history_rows = record%history%rows
     checkpoint%frames_written = record%frames
     checkpoint%ledger_names = ledger_names

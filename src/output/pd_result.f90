@@ -3,7 +3,8 @@
 !> All frames and rows are created, and their space on the disk is allocated, before the file gets
 !> its name. From then on its structure never changes: a frame is data written in place and handed
 !> to the operating system, then its attributes in one write, `written` among them; rows of the
-!> history likewise. A kill at any moment loses at most what is being written.
+!> history likewise. A kill at any moment loses at most what is being written. Space for rows that
+!> were not due in the end is given back when the run is complete.
 module pd_result
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   use pd_errors, only: error_list_t
@@ -15,7 +16,7 @@ module pd_result
   use pd_kinds, only: wp
   use pd_model, only: model_t
   use pd_observe, only: column_t, moment_t
-  use pd_rows, only: check_rows, copy_rows, put_rows, reserve_rows
+  use pd_rows, only: check_rows, copy_rows, put_rows, reserve_rows, resize_rows
   use pd_run_description, only: run_description_t, schema, schema_version, write_description
   use pd_state, only: state_t
   use pd_system, only: remove_file
@@ -124,17 +125,14 @@ contains
   !> Take in a row of the history. It waits for others, and is written with the next frame at the
   !> latest.
   !>
-  !> Errors: there is no space for it, or the file cannot be written.
+  !> Errors: the file cannot be written.
   subroutine add_row(result, values, errors)
     type(result_t),     intent(inout) :: result
     real(wp),           intent(in)    :: values(:)   !! in the order of the columns
     type(error_list_t), intent(inout) :: errors
     real(wp) :: time
 
-    if (result%rows_written + result%waiting >= result%places%rows) then
-      call errors%add('there is no place for another row of the history', where=result%path)
-      return
-    end if
+    if (result%rows_written + result%waiting >= result%places%rows) call make_room(result, errors)
     result%waiting = result%waiting + 1
     result%bunch_of(:, result%waiting) = values
     time = now()
@@ -142,6 +140,20 @@ contains
     if (result%waiting == bunch .or. time - result%waiting_since > patience) &
       call write_rows(result, errors)
   end subroutine add_row
+
+  !> Make room for more rows than were planned, the time step having changed: for about as many more
+  !> as there are, so that it is rarely done.
+  subroutine make_room(result, errors)
+    type(result_t),     intent(inout) :: result
+    type(error_list_t), intent(inout) :: errors
+    type(hdf5_file_t) :: file
+
+    call open_file(file, result%path, .true., errors)
+    call put_waiting_rows(result, file, errors)
+    result%places%rows = 2 * result%places%rows + bunch
+    call resize_rows(file, result%columns, result%rows_written, result%places%rows, errors)
+    call close_file(file, errors)
+  end subroutine make_room
 
   !> Write the rows that wait.
   !>
@@ -217,14 +229,20 @@ contains
     call close_file(file, errors)
   end subroutine write_failed_frame
 
-  !> Write the rows that wait and mark the result as complete: the run has come to its end.
-  subroutine finish_result(result, errors)
+  !> Write the rows that wait, and mark the result as complete: the run has come to its end. Only
+  !> now are the number of steps and of rows known for sure, for the time step may have changed.
+  subroutine finish_result(result, moment, errors)
     type(result_t),     intent(inout) :: result
+    type(moment_t),     intent(in)    :: moment   !! the end
     type(error_list_t), intent(inout) :: errors
     type(hdf5_file_t) :: file
 
     call open_file(file, result%path, .true., errors)
     call put_waiting_rows(result, file, errors)
+    if (result%rows_written < result%places%rows) &
+      call resize_rows(file, result%columns, result%rows_written, result%rows_written, errors)
+    call write_attribute(file, '/', 'steps', moment%step, errors)
+    call write_attribute(file, '/', 'time_step', moment%time_step, errors)
     call write_attribute(file, '/', 'complete', 1, errors)
     call close_file(file, errors)
     call renew_xdmf(result, errors)

@@ -1,20 +1,21 @@
 !> The history in a result file: /history/<column>, one dataset per column.
 !>
-!> Space for all rows is allocated with the file. They are filled in bunches: first the data, which
-!> are handed to the operating system, then `written`, the number of valid rows. A kill at any
-!> moment loses at most the rows of the last bunch.
+!> Space for the rows as planned is allocated with the file; it changes only where the time step has
+!> changed their number. They are filled in bunches: first the data, which are handed to the
+!> operating system, then `written`, the number of valid rows. A kill at any moment loses at most
+!> the rows of the last bunch.
 module pd_rows
   use pd_errors, only: error_list_t
   use pd_frames, only: write_label
   use pd_hdf5, only: create_group, flush_file, hdf5_file_t, overwrite_part, read_attribute, &
-    read_dataset, reserve_dataset, reserve_whole_numbers, write_attribute
+    read_dataset, remove_object, reserve_dataset, reserve_whole_numbers, write_attribute
   use pd_kinds, only: wp
   use pd_observe, only: column_t
   use pd_text, only: integer_text
   implicit none
   private
 
-  public :: reserve_rows, put_rows, check_rows, copy_rows
+  public :: reserve_rows, put_rows, check_rows, copy_rows, resize_rows
 
   character(*), parameter :: group = '/history'
 
@@ -33,14 +34,23 @@ contains
     call write_attribute(file, group, 'written', 0, errors)
     call write_attribute(file, group, 'columns', names_of(columns), errors)
     do k = 1, size(columns)
-      if (columns(k)%whole_number) then
-        call reserve_whole_numbers(file, place_of(columns(k)), [n], errors)
-      else
-        call reserve_dataset(file, place_of(columns(k)), [n], errors)
-      end if
-      call write_label(file, place_of(columns(k)), columns(k)%label_t, errors)
+      call reserve_column(file, columns(k), n, errors)
     end do
   end subroutine reserve_rows
+
+  subroutine reserve_column(file, column, n, errors)
+    type(hdf5_file_t),  intent(inout) :: file
+    type(column_t),     intent(in)    :: column
+    integer,            intent(in)    :: n
+    type(error_list_t), intent(inout) :: errors
+
+    if (column%whole_number) then
+      call reserve_whole_numbers(file, place_of(column), [n], errors)
+    else
+      call reserve_dataset(file, place_of(column), [n], errors)
+    end if
+    call write_label(file, place_of(column), column%label_t, errors)
+  end subroutine reserve_column
 
   !> Write rows after the first `written` ones, and count them as written.
   subroutine put_rows(file, columns, written, values, errors)
@@ -96,6 +106,25 @@ contains
     end do
     call put_rows(new, columns, 0, rows, errors)
   end subroutine copy_rows
+
+  !> Change the space to that of n rows, at least those that are written.
+  subroutine resize_rows(file, columns, written, n, errors)
+    type(hdf5_file_t),  intent(inout) :: file
+    type(column_t),     intent(in)    :: columns(:)
+    integer,            intent(in)    :: written, n
+    type(error_list_t), intent(inout) :: errors
+    real(wp), allocatable :: values(:)
+    integer :: k
+
+    do k = 1, size(columns)
+      call read_dataset(file, place_of(columns(k)), values, errors)
+      if (.not. file%is_good()) return
+      call remove_object(file, place_of(columns(k)), errors)
+      call reserve_column(file, columns(k), n, errors)
+      call overwrite_part(file, place_of(columns(k)), 1, values(:written), errors)
+    end do
+    call write_attribute(file, group, 'rows', n, errors)
+  end subroutine resize_rows
 
   pure function place_of(column) result(place)
     type(column_t), intent(in) :: column

@@ -63,7 +63,7 @@ contains
       call errors%add('a frame is asked for after the end of the run', '&output')
       return
     end if
-    call new_schedule(clock%time_step, end_time, input%output%history_count, frame_times, &
+    call new_schedule(clock, end_time, input%output%history_count, frame_times, &
       schedule, errors)
 
   contains
