@@ -49,7 +49,7 @@ build    := build/$(BUILD)
 # ---------------------------------------------------------------------------------- targets
 .SUFFIXES:
 .DELETE_ON_ERROR:
-studies := fig3a fig3b fig4 fig5 horizon loading size softening influence heterogeneity
+studies := fig3a fig3b fig4 fig5 seeds horizon loading size softening influence heterogeneity
 .PHONY: all program objects post debug units demo demo-quick test lint verify \
   layers setup install help clean distclean figures $(studies) \
   report report-view site bench
@@ -82,6 +82,7 @@ fig3a:             ## study: apparent modulus against m at a fixed horizon
 fig3b:             ## study: apparent modulus against m at a fixed spacing
 fig4:              ## study: shear bands and their width against m
 fig5:              ## study: shear bands of the reference case at 1, 1.3 and 1.6 % strain
+seeds:             ## study: when one of two bands takes over: seeds, rate, damping
 horizon:           ## study: width of the band against the horizon
 loading:           ## study: platens, rate of loading, confining pressure
 size:              ## study: size and shape of the specimen

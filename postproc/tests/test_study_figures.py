@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -101,6 +102,21 @@ def test_several_columns_have_colours_and_series_have_dashes(runs: list[StudyRun
     assert list(lines) == ["Modulus, a", "Other, a", "Modulus, b", "Other, b"]
     assert lines["Modulus, a"].get_color() == lines["Modulus, b"].get_color()
     assert lines["Modulus, a"].get_marker() != lines["Modulus, b"].get_marker()
+
+
+def test_a_legend_has_the_titles_of_series_not_their_names(runs: list[StudyRun]) -> None:
+    titled = [dataclasses.replace(run, series_title=f"series {run.series}") for run in runs]
+    for drawing in (
+        plot(titled, {"x": "m", "y": "width"}, COLUMNS),
+        curves(titled, {"by": "series"}, COLUMNS),
+    ):
+        legend_of = drawing.figure.axes[0].get_legend()
+        assert [t.get_text() for t in legend_of.get_texts()] == ["series a", "series b"]
+        assert {row["series"] for row in drawing.rows} == {"a", "b"}
+    # Two with one title would be one.
+    same = [dataclasses.replace(run, series_title="both") for run in runs]
+    ax = plot(same, {"x": "m", "y": "width"}, COLUMNS).figure.axes[0]
+    assert [t.get_text() for t in ax.get_legend().get_texts()] == ["a", "b"]
 
 
 def test_names_stand_on_the_axis_in_their_order(runs: list[StudyRun]) -> None:

@@ -166,6 +166,13 @@ def test_series_add_to_what_stands_at_the_top(load: Any) -> None:
     assert study.series == (("one", "one"), ("two", "Two"))
 
 
+def test_a_series_that_only_reads_other_points_shares_the_run(load: Any) -> None:
+    read = "[[series]]\nname = 'read'\nsampled = '=0.2 / n'\nparameters = { n = [1, 2] }\n"
+    study = load(HEAD + "[[series]]\nname = 'own'\n" + read)
+    assert [run.state.sampled for run in study.runs] == [None, 0.2, 0.1]
+    assert len({run.identity for run in study.runs}) == 1
+
+
 def test_a_study_without_anything_varied_is_one_run(load: Any) -> None:
     (run,) = load(HEAD).runs
     assert (run.id, run.label) == ("trial", "Trial")
@@ -180,7 +187,7 @@ def test_names_of_runs_are_names_of_the_program_and_differ(load: Any) -> None:
     long = load(HEAD + f'[parameters]\nword = ["{"x" * 90}", "{"x" * 91}"]\n')
     names = [run.id for run in long.runs]
     assert len(set(names)) == 2
-    assert max(map(len, names)) == 60
+    assert max(map(len, names)) == 48
 
 
 def test_runs_with_the_same_model_have_the_same_identity(load: Any) -> None:
@@ -230,6 +237,9 @@ FINDING = '[[finding]]\ntitle = "F"\nfound = "{a}"\n'
         (HEAD + 'strain = "1 %"\n', 'line 5, strain: must be a number; found: "1 %"'),
         (HEAD + "strain = 0.006\n", "line 5, strain: the run 'Trial' has no frame at this strain"),
         (HEAD + "line = [0, 1]\n", "line 5, line: must be two points"),
+        (HEAD + "sampled = 0\n", "line 5, sampled: must be a number above 0"),
+        (HEAD + "sampled = true\n", "line 5, sampled: must be a number above 0"),
+        ("sampled = '=1 - m'\n" + SWEPT, "sampled: must be above 0, not 0"),
         (HEAD + "[parameters]\nm = []\n", "line 6, parameters, m: must have one value at least"),
         (HEAD + "[parameters]\nm = [1, 1]\n", "line 6, parameters, m: has the same value twice"),
         (HEAD + "[parameters]\nm = [[1]]\n", "line 6, parameters, m: must be numbers"),

@@ -19,7 +19,8 @@ from perigeo_post.study.types import Missing, State
 SIGNED = {
     "peak_stress", "strain_at_peak", "last_strain", "last_stress", "stress_at_state",
     "state_strain", "strain_at_90", "strain_at_50", "stress_0_5", "stress_1_0", "stress_1_5",
-    "strain_rate", "approach_velocity",
+    "strain_rate", "approach_velocity", "first_yield_strain", "change_begins", "change_half",
+    "change_over",
 }  # fmt: skip
 
 

@@ -10,11 +10,13 @@ module pd_run
   use pd_increment, only: increments_t, new_increments
   use pd_input, only: read_input
   use pd_input_types, only: input_t
+  use pd_kinds, only: wp
   use pd_ledger, only: ledger_t, new_ledger
   use pd_model, only: model_t, release_set_up, start
   use pd_observe, only: column_t, moment_at, observation_t, observe
   use pd_record, only: load_checkpoint, observe_state, open_record, record_frame, record_line, &
     record_progress, record_row, record_t, results_in_the_way, same_history, same_points
+  use pd_reversal, only: new_reversal, reversal_t
   use pd_run_description, only: provenance_t
   use pd_schedule, only: schedule_t
   use pd_setup, only: set_up_model
@@ -22,6 +24,7 @@ module pd_run
   use pd_setup_schedule, only: set_up_schedule
   use pd_state, only: state_t
   use pd_step, only: step_work_t
+  use pd_step_limit, only: new_step_limit, step_limit_t
   use pd_summary, only: summarise, summary_t
   use pd_timing, only: timing_t
   use pd_version, only: build_flags, code_version, git_hash
@@ -35,6 +38,8 @@ module pd_run
     type(model_t)      :: model
     type(schedule_t)   :: schedule
     type(clock_t)      :: clock
+    type(step_limit_t) :: limit
+    type(reversal_t)   :: reversal
     type(state_t)      :: state
     type(ledger_t)     :: ledger
     type(step_work_t)  :: work
@@ -46,6 +51,8 @@ module pd_run
     logical :: doubted = .false.              !! the energy balance has been warned of
     logical :: balance_doubted = .false.      !! that of the forces, too
     logical :: control_doubted = .false.      !! the part of the control in the work, too
+    logical :: step_doubted = .false.         !! the time step that the user has fixed, too
+    logical :: flow_doubted = .false.         !! flow that turns back, too
     integer(int64) :: last_checkpoint = 0     !! count of the system clock
     integer(int64) :: loop_start = 0          !! count of the system clock
   end type run_t
@@ -89,7 +96,10 @@ contains
       if (outcome%done) return
     end if
     run%clock = run%checkpoint%clock
+    run%limit = run%checkpoint%limit
     call set_up_schedule(run%input, run%clock, run%model, run%schedule, errors)
+    if (run%checkpoint%history_rows == 0) &
+      run%limit = new_step_limit(run%model%highest_frequency, run%clock%time_step)
     call outcome%end_if_any(errors, exit_input)
     if (outcome%done .or. options%check) return
     if (run%model%at_equilibrium) then
@@ -166,6 +176,8 @@ contains
         run%checkpoint%clock = run%clock
       end if
       call release_set_up(model)
+      run%reversal = new_reversal(model%materials, run%input%materials%kinematic_modulus < 0.0_wp, &
+        model%blocks)
     end associate
   end subroutine begin_state
 

@@ -17,16 +17,102 @@ module pd_run_steps
   implicit none
   private
 
-  public :: due_t, due_after_step, write_what_is_due, end_without_equilibrium, finish_run
+  public :: due_t, look_at_time_step, due_after_step, write_what_is_due, end_without_equilibrium
+  public :: finish_run
 
   !> What is written after a step. This is known before the step: only then must its state be whole.
   type :: due_t
     logical :: row = .false., frame = .false., checkpoint = .false.
     logical :: stop = .false.      !! a signal came
-    logical :: anything = .false.  !! the state will be looked at
+    logical :: anything = .false.  !! something is written: the state will be observed
+    logical :: whole = .false.     !! the state will be looked at
   end type due_t
 
 contains
+
+  !> Before a step: make it shorter if the body has strained so much that it is too long by now. A
+  !> step that the user has fixed is only doubted, once.
+  subroutine look_at_time_step(run, outcome)
+    type(run_t),     intent(inout) :: run
+    type(outcome_t), intent(inout) :: outcome
+    real(wp), parameter :: courant_safety = 0.9_wp   ! that of the input is of another limit
+    type(error_list_t) :: errors
+    logical :: found
+
+    if (.not. run%limit%look_due(run%clock%step)) return
+    call look_at_flow(run, errors)
+    call run%limit%look(run%model, run%state, run%clock, &
+      run%ledger%plastic_dissipation(run%model%blocks), found)
+    if (found) then
+      associate (given => run%input%integration)
+        if (given%time_step_rule == 'fixed') then
+          call doubt_time_step(run, errors)
+        else if (given%time_step_rule == 'courant') then
+          call shorten_time_step(courant_safety, run, outcome, errors)
+        else
+          call shorten_time_step(given%safety, run, outcome, errors)
+        end if
+      end associate
+      call run%timing%lap(kernel_history)
+    end if
+    if (.not. outcome%done) call outcome%end_if_any(errors, exit_file)
+  end subroutine look_at_time_step
+
+  !> Go back to a part of the stable step where half of the margin is used up.
+  !> A body that goes on to collapse would have ever shorter steps: it has failed.
+  subroutine shorten_time_step(safety, run, outcome, errors)
+    real(wp),           intent(in)    :: safety
+    type(run_t),        intent(inout) :: run
+    type(outcome_t),    intent(inout) :: outcome
+    type(error_list_t), intent(inout) :: errors
+    real(wp), parameter :: most = 0.95_wp   ! or one would have to look all the time
+    real(wp) :: part, stable
+
+    part = min(safety, most)
+    stable = 2.0_wp / run%limit%frequency
+    if (run%clock%time_step <= 0.5_wp * (1.0_wp + part) * stable) return
+    if (part * stable < run%limit%shortest) then
+      call fail('the stable time step has fallen below a thousandth of the first one', &
+        fastest_row(run), run, outcome)
+      return
+    end if
+    call run%clock%change_step(part * stable)
+    call run%schedule%fit(run%clock)
+    call record_line(run%record, 'time step shortened to '//short_number(run%clock%time_step)// &
+      ' s at step '//integer_text(run%clock%step)//', time '//short_number(run%clock%time())// &
+      ' s: 2/omega_max of the deformed body is now '//short_number(stable)//' s', errors)
+  end subroutine shorten_time_step
+
+  !> Warn of a time step beyond the stable one.
+  subroutine doubt_time_step(run, errors)
+    type(run_t),        intent(inout) :: run
+    type(error_list_t), intent(inout) :: errors
+
+    if (run%step_doubted .or. run%clock%time_step * run%limit%frequency <= 2.0_wp) return
+    run%step_doubted = .true.
+    call record_line(run%record, 'warning: the time step is too long for the deformed body at '// &
+      'step '//integer_text(run%clock%step)//': 2/omega_max is now '// &
+      short_number(2.0_wp / run%limit%frequency)//' s; the rule spectral would shorten it', errors)
+  end subroutine doubt_time_step
+
+  !> Flow that turns back meets a strength that kinematic softening has raised: told once, when it
+  !> has made more than a twentieth of the heat.
+  subroutine look_at_flow(run, errors)
+    type(run_t),        intent(inout) :: run
+    type(error_list_t), intent(inout) :: errors
+    real(wp), parameter :: sizeable = 0.05_wp
+
+    if (run%flow_doubted .or. .not. run%reversal%is_possible()) return
+    call run%reversal%look(run%model%materials, run%model%blocks, run%model%points%volume, &
+      run%state, run%ledger%plastic)
+    if (run%reversal%part() <= sizeable) return
+    run%flow_doubted = .true.
+    call record_line(run%record, 'warning: the flow turns back: at step '// &
+      integer_text(run%clock%step)//', '//short_number(100.0_wp * run%reversal%part())// &
+      ' % of the plastic heat is of flow against the back stress; kinematic softening makes '// &
+      'the material stronger backwards, up to 2 sigma_y - sigma_r; isotropic_modulus '// &
+      'does not', errors)
+  end subroutine look_at_flow
 
   !> What is due after a step. A signal that comes during a step takes effect after the next one.
   type(due_t) function due_after_step(step, run) result(due)
@@ -46,6 +132,7 @@ contains
       end if
     end associate
     due%anything = due%row .or. due%frame .or. due%checkpoint
+    due%whole = due%anything .or. run%limit%look_due(step)
   end function due_after_step
 
   !> Write what is due, but check the state first: a run that gains energy has failed.
@@ -141,6 +228,7 @@ contains
     real(wp), parameter :: most = 5.0e-2_wp, at_first = 0.1_wp
     real(wp) :: part
 
+    if (run%model%at_equilibrium) call look_at_flow(run, errors)
     if (run%balance_doubted) return
     if (run%model%at_equilibrium) then
       if (run%increments%unfinished == 0) return
@@ -203,7 +291,8 @@ contains
       call record_frame(run%model, run%state, run%record, errors)
     end do
     if (.not. due%checkpoint) return
-    call save_checkpoint(run%model, run%state, run%ledger, run%clock, run%record, errors)
+    call save_checkpoint(run%model, run%state, run%ledger, run%clock, run%limit, &
+      run%record, errors)
     call system_clock(run%last_checkpoint)
   end subroutine write_frames_and_checkpoint
 

@@ -179,18 +179,23 @@ contains
   end subroutine add_loads
 
   !> Memory of a run [bytes]: operators; per row the fields of the state, what does not change at
-  !> the points (7 numbers), K^-1 (3), A (4), a field of a frame on its way to the disk (5), the
-  !> points and a field of a checkpoint likewise (15).
+  !> the points (7 numbers), K^-1 (3), A (4), and what is needed at times: a field of a frame on its
+  !> way to the disk (5), the points and a field of a checkpoint likewise (15), the search for the
+  !> highest frequency of the strained body (21).
   real(wp) function memory(input, model)
     type(input_t), intent(in) :: input
     type(model_t), intent(in) :: model
     type(state_t) :: state
-    integer :: numbers
+    integer :: numbers, at_times, k
 
     state%remembered = model%materials%remembered()
-    numbers = state%numbers_per_point() + 7 + 3 + 4 + 5
+    at_times = 5
+    if (input%output%checkpoint_every > 0.0_wp) at_times = at_times + 15
+    do k = 1, size(input%materials)
+      if (input%materials(k)%strain_measure /= 'small') at_times = max(at_times, 21)
+    end do
+    numbers = state%numbers_per_point() + 7 + 3 + 4 + at_times
     if (model%at_equilibrium) numbers = numbers + numbers_per_row(state)
-    if (input%output%checkpoint_every > 0.0_wp) numbers = numbers + 15
     memory = model%operators%memory() + real(model%operators%n, wp) * 8.0_wp * real(numbers, wp)
   end function memory
 

@@ -11,7 +11,7 @@ program perigeo
   use pd_increment, only: take_increment
   use pd_run, only: open_outputs, run_t, set_up_run
   use pd_run_steps, only: due_after_step, due_t, end_without_equilibrium, finish_run, &
-    write_what_is_due
+    look_at_time_step, write_what_is_due
   use pd_step, only: take_step
   use pd_system, only: catch_signals
   implicit none
@@ -35,12 +35,14 @@ program perigeo
     if (run%model%at_equilibrium) then
       call take_increment(run%clock, run%schedule, run%model, run%state, run%increments, &
         run%ledger, run%timing)
+      if (run%increments%lost) call end_without_equilibrium(run, outcome)
       due = due_after_step(run%clock%step, run)
       failed_row = 0
-      if (run%increments%lost) call end_without_equilibrium(run, outcome)
     else
+      call look_at_time_step(run, outcome)
+      if (outcome%done) exit
       due = due_after_step(run%clock%step + 1, run)
-      call take_step(run%clock, due%anything, run%model, run%state, run%work, run%ledger, &
+      call take_step(run%clock, due%whole, run%model, run%state, run%work, run%ledger, &
         run%timing, failed_row)
     end if
     call write_what_is_due(due, failed_row, run, outcome)

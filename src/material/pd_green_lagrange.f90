@@ -16,6 +16,7 @@ module pd_green_lagrange
     procedure, nopass :: strain_block
     procedure, nopass :: first_piola_block
     procedure, nopass :: cauchy
+    procedure, nopass :: stiffening
   end type green_lagrange_t
 
 contains
@@ -63,6 +64,29 @@ contains
     associate (unused => kept)
     end associate
   end subroutine first_piola_block
+
+  !> Largest l^2 + S / (lambda + 2 G) of rows lo to hi, with the largest principal stretch l and
+  !> stress S: dP = F C : (F^T dF) + dF S along the principal axes.
+  pure function stiffening(lo, hi, h, s, modulus) result(largest)
+    integer,  intent(in) :: lo, hi
+    real(wp), intent(in), contiguous :: h(:, :)   !! H (n,4) xx xy yx yy
+    real(wp), intent(in), contiguous :: s(:, :)   !! S (n,4) xx yy zz xy [Pa]
+    real(wp), intent(in) :: modulus               !! lambda + 2 G [Pa]
+    real(wp) :: largest, mean, difference, shear, stress
+    integer  :: i
+
+    largest = 0.0_wp
+    !$omp simd simdlen(8) private(mean, difference, shear, stress) reduction(max:largest)
+    do i = lo, hi
+      mean = 1.0_wp + (h(i, 1) + h(i, 4)) &
+        + 0.5_wp * (h(i, 1)**2 + h(i, 2)**2 + h(i, 3)**2 + h(i, 4)**2)
+      difference = (h(i, 1) - h(i, 4)) &
+        + 0.5_wp * (h(i, 1)**2 + h(i, 3)**2 - h(i, 2)**2 - h(i, 4)**2)
+      shear = h(i, 2) + h(i, 3) + h(i, 1) * h(i, 2) + h(i, 3) * h(i, 4)
+      stress = 0.5_wp * (s(i, 1) + s(i, 2)) + sqrt(0.25_wp * (s(i, 1) - s(i, 2))**2 + s(i, 4)**2)
+      largest = max(largest, mean + sqrt(difference**2 + shear**2) + stress / modulus)
+    end do
+  end function stiffening
 
   !> Cauchy stress P F^T / det F.
   pure function cauchy(h, s) result(sigma)

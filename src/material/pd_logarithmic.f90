@@ -25,6 +25,7 @@ module pd_logarithmic
     procedure, nopass :: strain_block
     procedure, nopass :: first_piola_block
     procedure, nopass :: cauchy
+    procedure, nopass :: stiffening
   end type logarithmic_t
 
   !> Up to this z^2 a quotient of polynomials is artanh(z)/z to round-off. Rows beyond them, with
@@ -150,6 +151,27 @@ contains
       p(i + shift, 4) = t * fxx + (h(i, 3) * sxy + fyy * syy)
     end do
   end subroutine first_piola_block
+
+  !> Largest (1 - T / (lambda + 2 G)) / l^2 of rows lo to hi, with the smallest principal stretch l
+  !> and stress T: P = T / l along the principal axes. A J that is not positive counts as small.
+  pure function stiffening(lo, hi, h, s, modulus) result(largest)
+    integer,  intent(in) :: lo, hi
+    real(wp), intent(in), contiguous :: h(:, :)   !! H (n,4) xx xy yx yy
+    real(wp), intent(in), contiguous :: s(:, :)   !! T (n,4) xx yy zz xy [Pa]
+    real(wp), intent(in) :: modulus               !! lambda + 2 G [Pa]
+    real(wp) :: largest, growth, b, difference, shear, stress
+    integer  :: i
+
+    largest = 0.0_wp
+    !$omp simd simdlen(8) private(growth, b, difference, shear, stress) reduction(max:largest)
+    do i = lo, hi
+      call invariants(h(i, 1), h(i, 2), h(i, 3), h(i, 4), growth, b, difference, shear)
+      stress = 0.5_wp * (s(i, 1) + s(i, 2)) - sqrt(0.25_wp * (s(i, 1) - s(i, 2))**2 + s(i, 4)**2)
+      ! the squares of the principal stretches are b +- d, their product is J^2
+      largest = max(largest, (1.0_wp - stress / modulus) * (b + sqrt(difference**2 + shear**2)) &
+        / max(smallest_j, 1.0_wp + growth)**2)
+    end do
+  end function stiffening
 
   !> What F^T F consists of; in H, so that small strains keep their digits.
   pure subroutine invariants(hxx, hxy, hyx, hyy, growth, b, difference, shear)

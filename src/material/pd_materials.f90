@@ -41,6 +41,8 @@ module pd_materials
     procedure :: remembered
     procedure :: stress_block
     procedure :: linear_stress_block
+    procedure :: next_stress_block
+    procedure :: stiffening
     procedure :: strain_block
     procedure :: first_piola_block
     procedure :: cauchy_block
@@ -158,6 +160,56 @@ contains
       end associate
     end do
   end subroutine linear_stress_block
+
+  !> First Piola stress of a block if its step leads it to H + part dH; the points stay as they are.
+  pure subroutine next_stress_block(self, block, points, h, part, dh, p)
+    class(materials_t), intent(in) :: self
+    integer,  intent(in) :: block
+    type(law_points_t), intent(in) :: points             !! before the step
+    real(wp), intent(in), contiguous :: h(:, :), dh(:, :)   !! (n,4) xx xy yx yy
+    real(wp), intent(in)    :: part
+    real(wp), intent(inout) :: p(n_block, 4)             !! out: P xx xy yx yy [Pa]
+    type(law_points_t) :: after
+    type(flow_t) :: flow
+    real(wp) :: reached(n_block, 4), kept(n_block, n_kept)
+    integer  :: first, from, to, k
+
+    allocate (after%stress(n_block, 4), after%history(n_block, size(points%history, 2)), &
+      after%strength(n_block))
+    first = self%runs(self%first_run(block))%lo
+    do k = self%first_run(block), self%first_run(block + 1) - 1
+      associate (run => self%runs(k), material => self%list(self%runs(k)%material))
+        from = run%lo - first + 1
+        to = run%hi - first + 1
+        after%stress(from:to, :) = points%stress(run%lo:run%hi, :)
+        after%history(from:to, :) = points%history(run%lo:run%hi, :)
+        after%strength(from:to) = points%strength(run%lo:run%hi)
+        reached(from:to, :) = h(run%lo:run%hi, :) + part * dh(run%lo:run%hi, :)
+        call material%measure%strain_block(1, from, to, reached, p, kept)
+        call material%law%stress_block(1, from, to, p, after, flow)
+        call material%measure%first_piola_block(1, from, to, reached, after%stress, kept, p)
+      end associate
+    end do
+  end subroutine next_stress_block
+
+  !> Largest modulus of a longitudinal wave in a block over that of the unloaded material.
+  pure real(wp) function stiffening(self, block, h, stress) result(largest)
+    class(materials_t), intent(in) :: self
+    integer,  intent(in) :: block
+    real(wp), intent(in), contiguous :: h(:, :)        !! H (n,4) xx xy yx yy
+    real(wp), intent(in), contiguous :: stress(:, :)   !! conjugate stress (n,4) xx yy zz xy [Pa]
+    real(wp) :: lambda, shear_modulus
+    integer  :: k
+
+    largest = 0.0_wp
+    do k = self%first_run(block), self%first_run(block + 1) - 1
+      associate (run => self%runs(k), material => self%list(self%runs(k)%material))
+        call material%law%lame_constants(lambda, shear_modulus)
+        largest = max(largest, material%measure%stiffening(run%lo, run%hi, h, stress, &
+          lambda + 2.0_wp * shear_modulus))
+      end associate
+    end do
+  end function stiffening
 
   !> Stored elastic energy per volume of the rows of a block.
   pure subroutine energy_block(self, block, points, energy)

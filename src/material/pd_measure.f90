@@ -18,6 +18,7 @@ module pd_measure
     procedure(strain_of), deferred, nopass :: strain_block
     procedure(first_piola_of), deferred, nopass :: first_piola_block
     procedure(cauchy_of), deferred, nopass :: cauchy
+    procedure(stiffening_of), deferred, nopass :: stiffening
   end type measure_t
 
   abstract interface
@@ -45,6 +46,17 @@ module pd_measure
       real(wp), intent(in) :: s(4)   !! conjugate stress xx yy zz xy [Pa]
       real(wp) :: sigma(4)           !! xx yy zz xy [Pa]
     end function cauchy_of
+    !> Largest modulus of a longitudinal wave in rows lo to hi, in terms of the reference positions,
+    !> over that of the unloaded body: how much the squares of the highest frequencies may have
+    !> risen. Of an elastic law; flow makes points softer.
+    pure function stiffening_of(lo, hi, h, s, modulus) result(largest)
+      import :: wp
+      integer,  intent(in) :: lo, hi
+      real(wp), intent(in), contiguous :: h(:, :)   !! H (n,4) xx xy yx yy
+      real(wp), intent(in), contiguous :: s(:, :)   !! conjugate stress (n,4) xx yy zz xy [Pa]
+      real(wp), intent(in) :: modulus               !! lambda + 2 G [Pa]
+      real(wp) :: largest
+    end function stiffening_of
   end interface
 
 contains

@@ -15,7 +15,13 @@ module pd_forces
   implicit none
   private
 
-  public :: forces, internal_forces, linear_forces
+  public :: forces, internal_forces, linear_forces, next_step_t, prepare_next_step
+
+  !> Where a step leads a state, if the points go on as they move.
+  type :: next_step_t
+    real(wp), allocatable :: h(:, :)   !! H (n,4) xx xy yx yy
+    real(wp), allocatable :: p(:, :)   !! first Piola stress (n,4) xx xy yx yy [Pa]
+  end type next_step_t
 
 contains
 
@@ -128,26 +134,65 @@ contains
     end do
   end function first_inverted
 
-  !> Internal force of a small displacement of the unloaded elastic body: the linearised operator,
-  !> control included.
-  subroutine linear_forces(operators, materials, u, h, f)
+  !> Prepare `linear_forces` of a state.
+  subroutine prepare_next_step(operators, materials, time_step, state, next)
+    class(operators_t), intent(inout) :: operators
+    type(materials_t),  intent(in)    :: materials
+    real(wp),           intent(in)    :: time_step   !! dt [s]
+    type(state_t),      intent(inout) :: state       !! whole; its halo is brought up to date
+    type(next_step_t),  intent(out)   :: next
+    real(wp) :: p(n_block, 4)
+    integer  :: block, lo, hi, n_blocks
+
+    n_blocks = operators%domain%blocks%count
+    allocate (next%h(operators%n, 4), next%p(operators%n, 4), source=0.0_wp)
+    call operators%take_in(state%velocity)
+    !$omp parallel do schedule(static) default(none) private(block, lo, hi, p) &
+    !$omp shared(n_blocks, operators, materials, time_step, state, next)
+    do block = 1, n_blocks
+      lo = operators%domain%blocks%lo(block)
+      hi = operators%domain%blocks%hi(block)
+      call operators%gradient_block(lo, hi, state%velocity, next%h)
+      next%h(lo:hi, :) = state%displacement_gradient(lo:hi, :) + time_step * next%h(lo:hi, :)
+      call materials%next_stress_block(block, state%law_points_t, next%h, 0.0_wp, next%h, p)
+      next%p(lo:hi, :) = p(:hi - lo + 1, :)
+    end do
+    !$omp end parallel do
+  end subroutine prepare_next_step
+
+  !> Internal force of a small displacement, control included: the linearised operator. Of the
+  !> unloaded elastic body or, where a state is given, of the body after its next step, in which
+  !> points that flow are softer. What the control holds turns with the points; that changes too
+  !> little to matter. The difference is small against the strain of a step, and good to half of the
+  !> digits.
+  !>
+  !> The operators have taken in u then: who goes on with a state has its displacement taken in.
+  subroutine linear_forces(operators, materials, u, h, f, state, next)
     class(operators_t), intent(inout) :: operators
     type(materials_t),  intent(in)    :: materials
     real(wp), intent(inout), contiguous :: u(:, :)   !! (n,2) [m]; its halo is brought up to date
     real(wp), intent(inout), contiguous :: h(:, :)   !! work space (n,4)
     real(wp), intent(inout), contiguous :: f(:, :)   !! out: (n,2) [N/m^3]
+    type(state_t),     intent(in), optional :: state
+    type(next_step_t), intent(in), optional :: next
+    real(wp), parameter :: part = 1.0e-10_wp
     real(wp) :: p(n_block, 4)
     integer  :: block, lo, hi, n_blocks
 
     n_blocks = operators%domain%blocks%count
     call operators%take_in(u)
     !$omp parallel do schedule(static) default(none) private(block, lo, hi, p) &
-    !$omp shared(n_blocks, operators, materials, u, h)
+    !$omp shared(n_blocks, operators, materials, u, h, state, next)
     do block = 1, n_blocks
       lo = operators%domain%blocks%lo(block)
       hi = operators%domain%blocks%hi(block)
       call operators%gradient_block(lo, hi, u, h)
-      call materials%linear_stress_block(block, h, p)
+      if (present(state)) then
+        call materials%next_stress_block(block, state%law_points_t, next%h, part, h, p)
+        p(:hi - lo + 1, :) = (p(:hi - lo + 1, :) - next%p(lo:hi, :)) / part
+      else
+        call materials%linear_stress_block(block, h, p)
+      end if
       call operators%hold_block(block, u, h, p)
       call operators%hand_over_block(lo, hi, h, p)
     end do

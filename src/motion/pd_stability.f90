@@ -3,17 +3,18 @@
 !> Source: doc/theory.md, section 6; Golub & Van Loan, Matrix Computations, chapter 10 (Lanczos).
 module pd_stability
   use pd_blocks, only: blocks_t
-  use pd_forces, only: linear_forces
+  use pd_forces, only: linear_forces, next_step_t, prepare_next_step
   use pd_kinds, only: block_sum, n_block, wp
   use pd_model, only: model_t
+  use pd_state, only: state_t
   implicit none
   private
 
-  public :: find_highest_frequency
+  public :: find_highest_frequency, frequency_of_state, stiffening
 
 contains
 
-  !> Highest frequency of the model, unless it is known already.
+  !> Highest frequency of the unloaded model, unless it is known already.
   subroutine find_highest_frequency(model)
     type(model_t), intent(inout) :: model
     integer :: iterations
@@ -22,24 +23,62 @@ contains
       call highest_frequency(model, model%highest_frequency, iterations)
   end subroutine find_highest_frequency
 
-  !> Largest angular frequency of the unloaded elastic body [1/s], free components only, control
-  !> included: the square root of the largest eigenvalue of M^-1 K by Lanczos iteration.
+  !> Highest frequency in a state that is whole, with the flow of its next step: points that flow
+  !> answer a small motion like points that flow, and are softer than elastic ones.
+  real(wp) function frequency_of_state(model, state, time_step) result(frequency)
+    type(model_t), intent(inout) :: model
+    type(state_t), intent(inout) :: state       !! its halo is brought up to date
+    real(wp),      intent(in)    :: time_step   !! dt [s]
+    type(next_step_t) :: next
+    integer :: iterations
+
+    call prepare_next_step(model%operators, model%materials, time_step, state, next)
+    call highest_frequency(model, frequency, iterations, state, next)
+    call model%operators%take_in(state%displacement)
+  end function frequency_of_state
+
+  !> How much the highest frequency of an elastic body may have risen by its deformation: the square
+  !> root of what the modulus of its stiffest point has grown by.
+  real(wp) function stiffening(model, state)
+    type(model_t), intent(in) :: model
+    type(state_t), intent(in) :: state
+    real(wp), allocatable :: parts(:)
+    integer :: block
+
+    allocate (parts(model%blocks%count))
+    !$omp parallel do schedule(static) default(none) private(block) shared(model, state, parts)
+    do block = 1, model%blocks%count
+      parts(block) = model%materials%stiffening(block, state%displacement_gradient, state%stress)
+    end do
+    !$omp end parallel do
+    stiffening = sqrt(max(1.0_wp, model%blocks%largest(parts)))
+  end function stiffening
+
+  !> Largest angular frequency of the unloaded elastic body [1/s], or of the body in a state: the
+  !> square root of the largest eigenvalue of M^-1 K by Lanczos iteration. Free components only,
+  !> control included.
   !>
   !> The operator is self-adjoint in the inner product weighted with V rho. The Ritz value rises to
   !> the eigenvalue from below; the iteration ends when it has risen by less than 3e-3 of itself in
-  !> ten iterations, and twice as much is added. The start vector is the same for every run.
-  subroutine highest_frequency(model, frequency, iterations)
+  !> ten iterations, and twice as much is added. In a state the time step has a margin, and a rise
+  !> of 1e-2 in five iterations is near enough. The start vector is the same for every run.
+  subroutine highest_frequency(model, frequency, iterations, state, next)
     type(model_t), intent(inout) :: model
     real(wp),      intent(out)   :: frequency     !! [1/s]
     integer,       intent(out)   :: iterations
-    integer,  parameter :: most_iterations = 400, look_back = 10
-    real(wp), parameter :: tolerance = 3.0e-3_wp, still_to_rise = 2.0_wp
+    type(state_t), intent(in), optional :: state
+    type(next_step_t), intent(in), optional :: next
+    integer,  parameter :: most_iterations = 400
+    real(wp), parameter :: still_to_rise = 2.0_wp
     real(wp), allocatable :: q(:, :), q_old(:, :), r(:, :), h(:, :), spare(:, :)
     real(wp), allocatable :: volume(:), mass(:), density(:)
     real(wp) :: diagonal(most_iterations), off_diagonal(0:most_iterations)
     real(wp) :: ritz(0:most_iterations)
-    integer  :: k, n
+    real(wp) :: tolerance
+    integer  :: k, n, look_back
 
+    look_back = merge(5, 10, present(state))
+    tolerance = merge(1.0e-2_wp, 3.0e-3_wp, present(state))
     n = size(model%points%volume)
     allocate (q(n, 2), r(n, 2), q_old(n, 2), h(n, 4), source=0.0_wp)
     allocate (density(n), source=model%materials%density_of(n))
@@ -55,7 +94,7 @@ contains
       call scale_to(1.0_wp / sqrt(product_of(blocks, mass, q, q, free)), q)
       do k = 1, most_iterations
         iterations = k
-        call linear_forces(model%operators, model%materials, q, h, r)
+        call linear_forces(model%operators, model%materials, q, h, r, state, next)
         diagonal(k) = -product_of(blocks, volume, q, r, free) / reference
         call combine(density, free, r, -diagonal(k), q, -off_diagonal(k - 1), q_old)
         off_diagonal(k) = sqrt(product_of(blocks, mass, r, r, free))

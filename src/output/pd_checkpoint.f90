@@ -14,6 +14,7 @@ module pd_checkpoint
     read_attribute, read_dataset, write_attribute, write_dataset
   use pd_kinds, only: i8, wp
   use pd_state, only: state_t
+  use pd_step_limit, only: step_limit_t
   use pd_system, only: remove_file, rename_file
   implicit none
   private
@@ -23,6 +24,7 @@ module pd_checkpoint
   !> What a run needs apart from its state.
   type :: checkpoint_t
     type(clock_t) :: clock
+    type(step_limit_t) :: limit
     integer  :: history_rows = 0        !! written so far
     integer  :: frames_written = 0      !! written so far, 000000 among them
     character(:), allocatable :: ledger_names(:)
@@ -158,6 +160,12 @@ contains
     call write_attribute(file, '/', 'time_step', checkpoint%clock%time_step, errors)
     call write_attribute(file, '/', 'start_step', checkpoint%clock%start_step, errors)
     call write_attribute(file, '/', 'start_time', checkpoint%clock%start_time, errors)
+    call write_attribute(file, '/', 'limit_frequency', checkpoint%limit%frequency, errors)
+    call write_attribute(file, '/', 'limit_stiffening', checkpoint%limit%stiffening, errors)
+    call write_attribute(file, '/', 'limit_step', checkpoint%limit%step, errors)
+    call write_attribute(file, '/', 'limit_flow', checkpoint%limit%flow, errors)
+    call write_attribute(file, '/', 'limit_dissipated', checkpoint%limit%dissipated, errors)
+    call write_attribute(file, '/', 'limit_shortest', checkpoint%limit%shortest, errors)
     call write_attribute(file, '/', 'history_rows', checkpoint%history_rows, errors)
     call write_attribute(file, '/', 'frames_written', checkpoint%frames_written, errors)
     call write_dataset(file, '/ledger_names', checkpoint%ledger_names, errors)
@@ -282,6 +290,12 @@ contains
     call read_attribute(file, '/', 'time_step', checkpoint%clock%time_step, errors)
     call read_attribute(file, '/', 'start_step', checkpoint%clock%start_step, errors)
     call read_attribute(file, '/', 'start_time', checkpoint%clock%start_time, errors)
+    call read_attribute(file, '/', 'limit_frequency', checkpoint%limit%frequency, errors)
+    call read_attribute(file, '/', 'limit_stiffening', checkpoint%limit%stiffening, errors)
+    call read_attribute(file, '/', 'limit_step', checkpoint%limit%step, errors)
+    call read_attribute(file, '/', 'limit_flow', checkpoint%limit%flow, errors)
+    call read_attribute(file, '/', 'limit_dissipated', checkpoint%limit%dissipated, errors)
+    call read_attribute(file, '/', 'limit_shortest', checkpoint%limit%shortest, errors)
     call read_attribute(file, '/', 'history_rows', checkpoint%history_rows, errors)
     call read_attribute(file, '/', 'frames_written', checkpoint%frames_written, errors)
     call read_dataset(file, '/ledger_names', checkpoint%ledger_names, errors)

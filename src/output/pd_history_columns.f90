@@ -27,7 +27,7 @@ contains
     allocate (columns(0))
     call add(columns, column_t('step', '1', 'number of the step', whole_number=.true., &
       value=step))
-    call add(columns, column_t('time', 's', 'time of the step', value=time))
+    call add(columns, column_t('time', 's', 'sum of the time steps', value=time))
     if (model%platens%axis > 0) call add(columns, column_t('strain', '1', &
       'nominal strain between the platens, compression positive', value=strain))
     do k = 1, size(model%supports%items)
@@ -64,6 +64,8 @@ contains
       'to move, over reactions and loads', value=unbalanced_force))
     call add(columns, column_t('damping_share', '1', 'sum of the forces of the damping, over '// &
       'reactions and loads', value=damping_share))
+    call add(columns, column_t('time_step', 's', 'time step of the step that ends here', &
+      value=time_step))
   end subroutine history_columns
 
   subroutine add(columns, column)
@@ -223,6 +225,12 @@ contains
 
     value = row%moment%time
   end function time
+
+  pure real(wp) function time_step(row) result(value)
+    type(row_view_t), intent(in) :: row
+
+    value = row%moment%time_step
+  end function time_step
 
   pure real(wp) function strain(row) result(value)
     type(row_view_t), intent(in) :: row

@@ -23,6 +23,7 @@ module pd_record
   use pd_run_description, only: provenance_t, run_description_t
   use pd_schedule, only: schedule_t
   use pd_state, only: state_t
+  use pd_step_limit, only: step_limit_t
   implicit none
   private
 
@@ -224,11 +225,12 @@ contains
   end subroutine record_line
 
   !> Write a checkpoint of the state after a step, but first the rows of the history before it.
-  subroutine save_checkpoint(model, state, ledger, clock, record, errors)
+  subroutine save_checkpoint(model, state, ledger, clock, limit, record, errors)
     type(model_t),      intent(in)    :: model
     type(state_t),      intent(inout) :: state   !! visited, not changed
     type(ledger_t),     intent(in)    :: ledger
     type(clock_t),      intent(in)    :: clock
+    type(step_limit_t), intent(in)    :: limit
     type(record_t),     intent(inout) :: record
     type(error_list_t), intent(inout) :: errors
     type(checkpoint_t) :: checkpoint
@@ -238,6 +240,7 @@ contains
     call write_rows(record%result, errors)
     if (errors%count() > before) return
     checkpoint%clock = clock
+    checkpoint%limit = limit
     checkpoint%history_rows = record%history%rows
     checkpoint%frames_written = record%frames
     checkpoint%ledger_names = ledger_names

@@ -3,6 +3,7 @@
 import h5py
 import numpy as np
 import pytest
+from case_files import SPECIMEN, changed
 
 # Two layers of 1 m between smooth walls, the upper one twice as stiff, under a load on top.
 LOAD, LOWER, UPPER = 20.0e3, (25.0e6, 0.2), (50.0e6, 0.3)
@@ -134,3 +135,37 @@ def test_a_material_that_no_body_has_changes_nothing(run_case, tmp_path):
     told = [run_case(case, tmp_path, "--check").stdout.splitlines() for case in (one, stiff)]
     assert len(told[0]) > 10
     assert told[0][:-1] == told[1][:-1]
+
+
+# A square that is sheared by 2 %, and then on or back.
+SHEARED = """
+&run name = 'case', output_dir = 'out' /
+&discretisation spacing = 0.1, horizon = 0.25 /
+&body x_min = 0.0, x_max = 1.0, y_min = 0.0, y_max = 1.0 /
+&material model = 'j2', density = 2000.0, youngs_modulus = 50.0e6, poissons_ratio = 0.3
+  yield_stress = 0.15e6, {softening} = -1.5e6, residual_strength = 15.0e3 /
+&boundary name = 'round', side = 'all', contact = 'affine'
+  velocity_gradient = 0.0, 0.02, 0.0, 0.0
+  times = 0.0, 1.0, 1.001, 2.0, factors = 1.0, 1.0, {then}, {then} /
+&integration end_time = 2.0, damping = 5.0e4 /
+&output history_count = 100 /
+"""
+TURNS_BACK = "warning: the flow turns back: at step "
+
+
+@pytest.mark.parametrize(
+    ("softening", "then", "warned"),
+    [("kinematic_modulus", -1.0, 1), ("kinematic_modulus", 1.0, 0), ("isotropic_modulus", -1.0, 0)],
+)
+def test_flow_that_turns_back_is_warned_of(run_case, tmp_path, softening, then, warned):
+    done = run_case(SHEARED.format(softening=softening, then=then), tmp_path, "--quiet")
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "out" / "case.log").read_text().count(TURNS_BACK) == warned
+
+
+def test_bands_that_form_do_not_count_as_flow_that_turns_back(run_case, tmp_path):
+    text = changed(SPECIMEN, spacing="0.05", horizon="0.16", final_strain="0.02")
+    text = text.replace("frame_strains = 0.004, 0.01", "frame_count = 1")
+    done = run_case(text, tmp_path, "--quiet")
+    assert done.returncode == 0, done.stderr
+    assert TURNS_BACK not in (tmp_path / "out" / "case.log").read_text()

@@ -243,3 +243,48 @@ def test_plastic_shear_ends_at_its_closed_form(run_case, tmp_path):
         assert frame["plastic_strain"][()][inner] == pytest.approx(alpha, rel=0.07)
         assert frame["stress"][()][inner, 3] == pytest.approx(tau, rel=0.03)
         assert frame["displacement"][()][inner, 1] == pytest.approx(0.0, abs=1e-4)
+
+
+# -------------------------------------------------------------------------- similar bodies
+
+
+def scaled(k, density):
+    """Return the specimen k times as large, strained at the same rate, with drag in proportion.
+
+    Stresses are the same where C and rho fall with the square of the size: the body feels
+    rho a + C v per volume, which grows with the size, and divergences of stress fall with it.
+    """
+    return changed(
+        SPECIMEN,
+        spacing=f"{0.1 * k!r}",
+        horizon=f"{0.25 * k!r}",
+        x_max=f"{0.5 * k!r}",
+        y_max=f"{1.0 * k!r}",
+        velocity=f"0.0, {-0.01 * k!r}",
+        damping=f"{5.0e5 / k**2!r}",
+        density=f"{density!r}",
+        y=f"{0.3 * k!r}",
+        radius=f"{0.11 * k!r}",
+    )
+
+
+@pytest.mark.parametrize(("k", "tolerance"), [(2.0, 1e-14), (3.0, 1e-12)])
+def test_similar_bodies_behave_alike_where_the_density_is_in_proportion(
+    run_case, tmp_path, k, tolerance
+):
+    """Powers of two change no digit, other factors the last ones."""
+    found = {}
+    for name, size, density in (
+        ("one", 1.0, 2000.0), ("large", k, 2000.0 / k**2), ("heavy", k, 2000.0),
+    ):  # fmt: skip
+        folder = tmp_path / name
+        folder.mkdir()
+        done = run_case(scaled(size, density), folder, "--quiet", "--threads", "1")
+        assert done.returncode == 0, done.stderr
+        rows = history(folder / "out" / "case_history.csv")
+        strain, force = rows["strain"], rows["bottom_force_y"] / size
+        found[name] = np.interp(np.linspace(0.0, 0.0099, 200), strain, force)
+        assert rows["max_plastic_strain"][-1] > 0.01
+    scale = np.abs(found["one"]).max()
+    assert np.abs(found["large"] - found["one"]).max() < tolerance * scale
+    assert np.abs(found["heavy"] - found["one"]).max() > 1e-5 * scale

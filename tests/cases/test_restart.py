@@ -100,6 +100,40 @@ def test_a_run_that_was_stopped_goes_on_as_if_it_were_not(
     assert_same(tmp_path / "out", straight)
 
 
+# A sheet that is stretched until its time step has become shorter several times.
+STRETCHED = """\
+&run name = 'case', output_dir = 'out' /
+&discretisation spacing = 0.05, horizon = 0.125 /
+&body x_min = 0.0, x_max = 0.5, y_min = 0.0, y_max = 1.0 /
+&material model = 'elastic', strain_measure = 'green_lagrange', density = 2000.0
+  youngs_modulus = 50.0e6, poissons_ratio = 0.3 /
+&boundary name = 'round', side = 'all', contact = 'affine'
+  velocity_gradient = 0.1, 0.0, 0.0, 0.1 /
+&integration end_time = 3.0, damping = 5.0e4 /
+&output history_count = 3000, frame_count = 10 /
+"""
+
+
+def test_a_run_goes_on_with_the_time_step_that_it_had(program, run_case, tmp_path):
+    (tmp_path / "straight").mkdir()
+    assert run_case(STRETCHED, tmp_path / "straight", "--quiet", "--threads", "1").returncode == 0
+    straight = tmp_path / "straight" / "out"
+    rows = history(straight / "case_history.csv")
+    changes = (rows["time_step"][1:] < rows["time_step"][:-1]).nonzero()[0]
+    assert len(changes) >= 3
+    # after the first change, before the last; then between the ends
+    for rows_before in (changes[0] + 20, changes[1] - 100, changes[-1] + 20):
+        folder = tmp_path / str(rows_before)
+        folder.mkdir()
+        process = begin(program, folder, STRETCHED)
+        assert stop(process, signal.SIGTERM, folder, int(rows_before)) == 143
+        assert run_case(STRETCHED, folder, "--restart", "--quiet").returncode == 0
+        assert_same(folder / "out", straight)
+        with h5py.File(folder / "out" / "case.h5", locking=False) as file:
+            assert file.attrs["time_step"] == rows["time_step"][-1]
+            assert file.attrs["steps"] == rows["step"][-1]
+
+
 def test_a_run_may_be_stopped_twice(program, run_case, tmp_path, straight):
     assert stop(begin(program, tmp_path, LONG), signal.SIGINT, tmp_path, 60) == 130
     process = begin(program, tmp_path, LONG, "--restart")

@@ -59,7 +59,7 @@ def test_every_data_set_has_a_unit_and_a_description(results):
 
 # Units of the columns by how their names begin or end; a column that none fits is an error.
 UNITS = (
-    (r"time$", "s"),
+    (r"time(_step)?$", "s"),
     (r"\w+_force_[xy]$", "N/m"),
     (r"mean_stress_", "Pa"),
     (r"\w+_(energy|dissipation|heat|work)$", "J/m"),

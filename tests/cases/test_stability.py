@@ -2,10 +2,12 @@
 
 import itertools
 import math
+import re
 
+import h5py
 import numpy as np
 import pytest
-from case_files import SPECIMEN, history
+from case_files import SPECIMEN, changed, history
 
 SPACING, DENSITY, YOUNGS = 0.1, 2000.0, 50.0e6
 STEPS = 300  # about
@@ -124,15 +126,152 @@ SQUEEZED = """\
 """
 
 
+def fixed_step(text, step):
+    """Return an input whose rule is to take this time step."""
+    return re.sub(r"safety = [\d.]+", f"time_step_rule = 'fixed', time_step = {step!r}", text)
+
+
+def stable_step(run_case, folder, text):
+    """Return 2 / omega_max of the unloaded body."""
+    checked = run_case(text, folder, "--check")
+    assert checked.returncode == 0, checked.stderr
+    return float(checked.stdout.split("2/omega_max = ")[1].split()[0])
+
+
 def test_a_row_with_a_wrong_energy_is_doubted_and_then_not_called_good(run_case, tmp_path):
-    done = run_case(SQUEEZED, tmp_path, "--quiet")
+    text = fixed_step(SQUEEZED, 0.99 * stable_step(run_case, tmp_path, SQUEEZED))
+    done = run_case(text, tmp_path, "--quiet")
     assert done.returncode == 4
     assert "the calculation failed: the energy balance is off by" in done.stderr
     log = (tmp_path / "out" / "case.log").read_text()
     assert log.count("warning: the energy balance is off by") == 1
+    assert log.count("warning: the time step is too long for the deformed body at step") == 1
+    assert log.index("too long for the deformed body") < log.index("the calculation failed")
     error = history(tmp_path / "out" / "case_history.csv")["energy_error"]
     assert np.abs(error).max() <= 0.1
     assert (np.abs(error[:-2]) < 0.01).all()
+
+
+# A sheet that is stretched or squeezed in both directions.
+SHEET = """\
+&run name = 'case', output_dir = 'out' /
+&discretisation spacing = 0.1, horizon = 0.25 /
+&body x_min = 0.0, x_max = 0.5, y_min = 0.0, y_max = 1.0 /
+&material model = 'elastic', strain_measure = '{measure}', density = 2000.0
+  youngs_modulus = 50.0e6, poissons_ratio = 0.3 /
+&boundary name = 'round', side = 'all', contact = 'affine'
+  velocity_gradient = {rate}, 0.0, 0.0, {rate} /
+&integration end_time = 3.0, safety = 0.9, damping = 5.0e4 /
+&output history_count = 300, frame_count = 2 /
+"""
+STIFFENING = (("green_lagrange", 0.1), ("logarithmic", -0.1))
+SHORTENED = "time step shortened to "
+
+
+@pytest.mark.parametrize(("measure", "rate"), STIFFENING)
+def test_the_time_step_becomes_shorter_as_the_body_stiffens(run_case, tmp_path, measure, rate):
+    text = SHEET.format(measure=measure, rate=rate)
+    done = run_case(text, tmp_path, "--quiet", "--threads", "1")
+    assert done.returncode == 0, done.stderr
+    log = (tmp_path / "out" / "case.log").read_text()
+    rows = history(tmp_path / "out" / "case_history.csv")
+    steps = rows["time_step"]
+    assert log.count(SHORTENED) == len(set(steps)) - 1 >= 3
+    assert (np.diff(steps) <= 0).all()
+    # rows stand at the first step past their times, up to the end
+    assert len(steps) == 301
+    wanted = 3.0 * np.arange(301) / 300
+    late = rows["time"] - wanted
+    assert (late > -1e-9).all()
+    assert (late[1:] < steps[1:] * (1 + 1e-9)).all()
+    assert np.abs(rows["energy_error"][20:]).max() < 1e-3
+    with h5py.File(tmp_path / "out" / "case.h5", locking=False) as file:
+        assert file.attrs["complete"] == 1
+        assert file.attrs["steps"] == rows["step"][-1]
+        assert file.attrs["time_step"] == steps[-1]
+        assert file["frames/000002"].attrs["time"] == rows["time"][-1]
+    # the same stress as with a step that is short enough from the start
+    text_short = text.replace("safety = 0.9", "safety = 0.4")
+    assert run_case(text_short, tmp_path, "--quiet", "--force", "--threads", "1").returncode == 0
+    short = history(tmp_path / "out" / "case_history.csv")
+    assert len(set(short["time_step"])) == 1
+    expected = np.interp(rows["time"], short["time"], short["mean_stress_xx"])
+    assert rows["mean_stress_xx"][100:] == pytest.approx(expected[100:], rel=2e-3)
+    # the step with which it began is too long for that
+    fixed = fixed_step(text, float(steps[0]))
+    assert run_case(fixed, tmp_path, "--quiet", "--force", "--threads", "1").returncode == 4
+
+
+@pytest.mark.parametrize(("measure", "rate"), STIFFENING)
+def test_output_and_threads_do_not_touch_the_shortened_step(run_case, tmp_path, measure, rate):
+    text = SHEET.format(measure=measure, rate=rate)
+    ends = []
+    for threads, rows in ((1, 300), (2, 300), (1, 7)):
+        asked = text.replace("history_count = 300", f"history_count = {rows}")
+        options = ("--quiet", "--force", "--threads", threads)
+        assert run_case(asked, tmp_path, *options).returncode == 0
+        ends.append((tmp_path / "out" / "case_history.csv").read_text().splitlines()[-1])
+    assert ends[0] == ends[1] == ends[2]
+
+
+def test_the_forms_of_the_operators_shorten_the_step_alike(run_case, tmp_path):
+    text = SHEET.format(measure="green_lagrange", rate=0.1)
+    ends = []
+    for form in ("lattice", "list"):
+        asked = text.replace("output_dir", f"operators = '{form}', output_dir")
+        assert run_case(asked, tmp_path, "--quiet", "--force").returncode == 0
+        ends.append(history(tmp_path / "out" / "case_history.csv"))
+    assert ends[0]["time_step"] == pytest.approx(ends[1]["time_step"], rel=1e-6)
+    assert ends[0]["round_force_x"][-1] == pytest.approx(ends[1]["round_force_x"][-1], abs=1.0)
+
+
+def test_a_safety_close_to_one_lasts_as_well(run_case, tmp_path):
+    forces = []
+    for safety in ("0.99", "0.5"):
+        text = SQUEEZED.replace("0.99", safety)
+        assert run_case(text, tmp_path, "--quiet", "--force").returncode == 0
+        rows = history(tmp_path / "out" / "case_history.csv")
+        assert np.abs(rows["energy_error"][20:]).max() < 2e-3
+        forces.append(np.interp(0.2999, rows["strain"], rows["top_force_y"]))
+    assert forces[0] == pytest.approx(forces[1], rel=1e-3)
+
+
+# The plastic specimen squeezed by a third and more.
+CRUSHED = changed(SPECIMEN, final_strain="0.36", velocity="0.0, -0.05")
+CRUSHED = CRUSHED.replace("frame_strains = 0.004, 0.01", "frame_count = 3")
+CRUSHED = CRUSHED.replace("density", "strain_measure = '{measure}', density")
+CRUSHED = CRUSHED.replace("&integration", "&integration safety = {safety},")
+
+
+def crushed(run_case, folder, measure, safety):
+    """Return exit status, message and history of the specimen."""
+    text = CRUSHED.format(measure=measure, safety=safety)
+    done = run_case(text, folder, "--quiet", "--force", "--threads", "1")
+    return done.returncode, done.stderr, history(folder / "out" / "case_history.csv")
+
+
+def test_a_specimen_may_be_squeezed_by_a_third(run_case, tmp_path):
+    results = [crushed(run_case, tmp_path, "logarithmic", safety) for safety in (0.9, 0.5)]
+    for status, message, rows in results:
+        assert status == 0, message
+        assert rows["strain"][-1] >= 0.36
+        assert np.abs(rows["energy_error"][20:]).max() < 1e-3
+        assert (rows["top_force_y"][1:] < 0).all()
+    forces = [np.interp(0.3599, rows["strain"], rows["top_force_y"]) for _, _, rows in results]
+    assert forces[0] == pytest.approx(forces[1], rel=1e-3)
+
+
+def test_a_specimen_that_collapses_ends_so_with_any_step(run_case, tmp_path):
+    # With Green-Lagrange strain volume vanishes in the flow until det F is 0: that is the model.
+    results = [crushed(run_case, tmp_path, "green_lagrange", safety) for safety in (0.9, 0.5)]
+    for status, message, _ in results:
+        assert status == 4
+        assert "det F is not positive" in message
+    ends = [rows["strain"][-1] for _, _, rows in results]
+    assert ends[0] == pytest.approx(ends[1], abs=0.005)
+    common = np.linspace(0.05, 0.3, 11)
+    forces = [np.interp(common, rows["strain"], rows["top_force_y"]) for _, _, rows in results]
+    assert forces[0] == pytest.approx(forces[1], rel=5e-3)
 
 
 @pytest.mark.parametrize(("factor", "warned"), [("1.0", True), ("0.001", False)])

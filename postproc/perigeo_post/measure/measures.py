@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..read.errors import FieldNotFoundError, PostError, RequestError
+from ..read.points import FloatArray, PointSet
 from ..read.run import Frame, Run
 from .band import (
     LEVEL,
@@ -23,6 +24,7 @@ from .band import (
 from .band_fit import fitted_width
 from .band_search import find_bands, search_scale
 from .curves import curve_numbers, modulus_numbers, peak, stress_strain
+from .sampling import interpolate
 
 
 def frame_profile(frame: Frame, line: Line, field: str = "plastic_strain") -> Profile:
@@ -65,18 +67,63 @@ def measure_band(
     from the crossing with the other band (band.py says which).
     """
     frame = run.frame(strain, time, number, tolerance)
+    alpha = frame["plastic_strain"][run.body]
+    return _measured(frame, run.body_points, alpha, line, level, axis, normal)
+
+
+def measure_sampled_band(
+    frame: Frame, spacing: float, line: Line | None = None, level: float = LEVEL
+) -> BandMeasure:
+    """The same of the plastic strain read at the points of a lattice with another spacing [m].
+
+    What a measure makes of one and the same field when there are fewer points to read it from.
+    """
+    points, alpha = sampled_plastic_strain(frame, spacing)
+    return _measured(frame, points, alpha, line, level)
+
+
+def sampled_plastic_strain(frame: Frame, spacing: float) -> tuple[PointSet, FloatArray]:
+    """The plastic strain at the points of a lattice that begins in the lower corner of the body.
+
+    Read between the points of the run, as everywhere (sampling.py); points outside are left out.
+    """
+    run = frame.run
+    if not spacing > 0.0:
+        raise RequestError(f"the spacing of a lattice must be above 0, not {spacing:g}")
+    low, high = np.asarray(run.lower, dtype=float), np.asarray(run.upper, dtype=float)
+    x, y = (
+        low[k] + spacing * np.arange(int(np.floor((high[k] - low[k]) / spacing + 1e-6)) + 1)
+        for k in (0, 1)
+    )
+    places = np.column_stack([part.ravel() for part in np.meshgrid(x, y)])
+    alpha = frame["plastic_strain"][run.body]
+    found = interpolate(run.body_points, alpha, places[:, 0], places[:, 1])
+    inside = np.isfinite(found)
+    return PointSet(places[inside], spacing=spacing), found[inside]
+
+
+def _measured(
+    frame: Frame,
+    points: PointSet,
+    alpha: FloatArray,
+    line: Line | None,
+    level: float,
+    axis: str | None = None,
+    normal: bool = False,
+) -> BandMeasure:
+    """What is to be measured of the bands in a field of alpha at these points of the body."""
+    run = frame.run
     if not 0.0 < level < 1.0:
         raise RequestError(f"the level must lie between 0 and 1, not {level:g}")
-    bands = frame_bands(frame, axis, level)
+    extents = (run.lower, run.upper)
+    loading = axis or run.strain_axis or "y"
+    bands = find_bands(points, alpha, loading, run.horizon, level, extents)
     near = None
     if line is None:
-        line = line_across(
-            bands.prevailing, run.body_points, bands.axis, normal, (run.lower, run.upper)
-        )
-        near = (bands.prevailing.probe, 1.5 * search_scale(run.body_points, run.horizon))
-    profile = frame_profile(frame, line)
-    extent = profile_width(profile, run.body_points.spacing, level, near)
-    alpha = frame["plastic_strain"][run.body]
+        line = line_across(bands.prevailing, points, bands.axis, normal, extents)
+        near = (bands.prevailing.probe, 1.5 * search_scale(points, run.horizon))
+    profile = profile_along(points, alpha, line)
+    extent = profile_width(profile, points.spacing, level, near)
     there = [band for band in (bands.prevailing, bands.other) if band is not None]
     return BandMeasure(
         label=run.name,
@@ -86,8 +133,8 @@ def measure_band(
         profile=profile,
         interpolated=extent,
         bands=bands,
-        widths=tuple(fitted_width(run.body_points, alpha, b, run.horizon, level) for b in there),
-        spacing=run.body_points.spacing,
+        widths=tuple(fitted_width(points, alpha, b, run.horizon, level) for b in there),
+        spacing=points.spacing,
         horizon=run.horizon,
         largest=float(alpha.max()),
     )

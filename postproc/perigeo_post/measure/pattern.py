@@ -49,13 +49,25 @@ def pattern_of(frame: Frame) -> Pattern:
     ratio = None if system is None else system.ratio
     if before is None:
         return Pattern(name, None, ratio, None)
-    added = np.maximum(alpha - before["plastic_strain"][frame.run.body], 0.0)
+    added = _added(frame, before)
     if not added.max() > 0.0:
         return Pattern(name, ELASTIC, ratio, None)
     grown = _found(lambda: _bands_of(frame, added))
     if grown is None:
         return Pattern(name, DIFFUSE, ratio, None)
     return Pattern(name, _name(grown.ratio, X_GROWING), ratio, grown.ratio)
+
+
+def growth_ratio(frame: Frame, before: Frame) -> float | None:
+    """Weaker over stronger band in what has been added since a frame; None without a band."""
+    added = _added(frame, before)
+    grown = _found(lambda: _bands_of(frame, added))
+    return None if grown is None else grown.ratio
+
+
+def _added(frame: Frame, before: Frame) -> FloatArray:
+    body = frame.run.body
+    return np.maximum(frame["plastic_strain"][body] - before["plastic_strain"][body], 0.0)
 
 
 def earlier_frame(frame: Frame) -> Frame | None:

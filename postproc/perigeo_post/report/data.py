@@ -48,8 +48,8 @@ __all__ = [
 
 # The order of the paper; other studies follow by name.
 ORDER = (
-    "fig3a", "fig3b", "fig4", "fig5", "horizon", "loading", "size", "softening", "influence",
-    "heterogeneity",
+    "fig3a", "fig3b", "fig4", "fig5", "seeds", "horizon", "loading", "size", "softening",
+    "influence", "heterogeneity",
 )  # fmt: skip
 
 

@@ -16,8 +16,10 @@ HEADLINE = (
     "modulus_platen", "modulus_gauge", "modulus_mean", "peak_stress", "strain_at_peak",
     "stress_at_state", "largest_alpha", "width", "width_spread",
     "width_over_horizon", "width_interpolated", "width_interpolated_uncertainty",
-    "width_interpolated_over_horizon", "angle",
-    "band_ratio", "pattern", "softening_slope", "brittleness", "dissipated_energy",
+    "width_interpolated_over_horizon", "width_interpolated_median", "angle",
+    "band_ratio", "pattern", "change_half", "band_ratio_1_0", "band_ratio_growing_1_0",
+    "band_ratio_1_3", "first_yield_strain", "foot_over_centre", "lower_over_upper",
+    "softening_slope", "brittleness", "dissipated_energy",
     "yield_stress_variation", "kinetic_ratio_largest", "reaction_gap_largest",
     "energy_error_largest",
 )  # fmt: skip

@@ -90,7 +90,7 @@ def _rows(runs: Sequence[StudyRun], options: Mapping[str, Any], field: str) -> l
     strain = strains[0] if strains else None
     cells = [_cell(run, strain, run.label, options, field) for run in runs]
     if by_series:
-        names = draw.grouped(runs, "series")
+        names = dict.fromkeys(run.series for run in runs)
         return [_Row("", [c for c in cells if c.run.series == name]) for name in names]
     count = int(draw.number(options, "per_row") or _per_row(len(cells)))
     if count < 1:

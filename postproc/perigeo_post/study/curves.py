@@ -99,7 +99,8 @@ def _styled(
     by = draw.text(options, "by")
     if by:
         draw.require_known(runs, by, columns)
-    groups = list(draw.grouped(runs, by)) if by else []
+    groups = draw.grouped(runs, by) if by else {}
+    group_of = {run.id: name for name, members in groups.items() for run in members}
     found: list[_Styled] = []
     used: dict[str, int] = {}
     reason: PostError | None = None
@@ -112,10 +113,10 @@ def _styled(
         if not by:
             found.append(_Styled(run, curve, draw.look(k), run.label))
             continue
-        group = draw.shown(draw.value_of(run, by))
+        group = group_of[run.id]
         count = used.get(group, 0)
         used[group] = count + 1
-        look = draw.look(groups.index(group), count)
+        look = draw.look(list(groups).index(group), count)
         found.append(_Styled(run, curve, look, group if count == 0 else None))
     if not found:
         raise RequestError("no curve to draw") from reason

@@ -195,10 +195,16 @@ def shown(value: Value) -> str:
 
 
 def grouped(runs: Sequence[StudyRun], by: str) -> dict[str, list[StudyRun]]:
-    """Runs by the value of a parameter or column, in order of appearance."""
+    """Runs by the value of a parameter or column, in order of appearance; series by their titles.
+
+    Two series with the same title would be one: they keep their names.
+    """
     groups: dict[str, list[StudyRun]] = {}
     for run in runs:
         groups.setdefault(shown(value_of(run, by)), []).append(run)
+    titles = [members[0].series_title or name for name, members in groups.items()]
+    if by == "series" and len(set(titles)) == len(groups):
+        return dict(zip(titles, groups.values()))
     return groups
 
 

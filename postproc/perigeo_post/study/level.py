@@ -33,6 +33,7 @@ class Level:
     label: str
     strain: Any
     line: Any
+    sampled: Any
     place: Key
     title: str
 
@@ -58,6 +59,7 @@ class Level:
             label=self.label or top.label,
             strain=top.strain if self.strain is None else self.strain,
             line=top.line if self.line is None else self.line,
+            sampled=top.sampled if self.sampled is None else self.sampled,
             place=self.place,
             title=self.title,
         )
@@ -78,6 +80,7 @@ def level_of(table: LevelTable, place: Key, name: str) -> Level:
         label=table.label,
         strain=table.strain,
         line=table.line,
+        sampled=table.sampled,
         place=place,
         title=table.title or name,
     )

@@ -20,7 +20,7 @@ from .toml import Key, Problems
 from .types import State, Value
 
 MOST_RUNS = 1000
-LONGEST_ID = 60
+LONGEST_ID = 48  # of the program too
 CHECKPOINT_SECONDS = 60.0  # between checkpoints, where neither base nor study says
 
 _NOT_THE_MODEL = (*OF_THE_STUDY, "run.title", "output.checkpoint_every")
@@ -238,7 +238,14 @@ class Planner:
                 line = (first, second)
         except ExpressionError as error:
             self.problems.add(at("line"), str(error))
-        return State(strain=strain, line=line)
+        sampled = None
+        try:
+            sampled = _number(_valued(level.sampled, parameters))
+            if sampled is not None and sampled <= 0.0:
+                raise ExpressionError(f"must be above 0, not {sampled:g}")
+        except ExpressionError as error:
+            self.problems.add(at("sampled"), str(error))
+        return State(strain=strain, line=line, sampled=sampled)
 
     def _take_files(self, values: Values) -> dict[str, Path]:
         """Files of points go beside the input of the run."""

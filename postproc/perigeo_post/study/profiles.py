@@ -89,13 +89,15 @@ def profiles(
 def _states(run: StudyRun, options: Mapping[str, Any]) -> list[State]:
     line = _line(options) or run.state.line
     strains: list[float | None] = [*draw.numbers(options, "strain")]
-    return [State(strain, line) for strain in strains or [run.state.strain]]
+    return [State(s, line, run.state.sampled) for s in strains or [run.state.strain]]
 
 
 def _profile(run: StudyRun, state: State, options: Mapping[str, Any], field: str) -> _Curve:
     measured, _ = band_at(run.run, state, draw.number(options, "level") or LEVEL)
     frame = run.run.frame(number=measured.frame)
-    along = frame_profile(frame, measured.profile.line, field)
+    along = measured.profile  # of a field that was sampled, the samples
+    if state.sampled is None or field != along.name:
+        along = frame_profile(frame, measured.profile.line, field)
     return _Curve(run, measured, along.values, along.unit)
 
 

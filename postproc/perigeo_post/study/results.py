@@ -43,7 +43,9 @@ from .types import Missing, StudyRun, Value
 MEASURING = (
     "read/*.py",
     "measure/*.py",
+    "study/parts.py",
     "study/measures.py",
+    "study/growth.py",
     "study/expressions.py",
     "study/findings.py",
 )
@@ -81,6 +83,7 @@ class Outcome:
 
 def measure(outcome: Outcome, kinds: Kinds) -> None:
     """Take the measures of all runs that are done."""
+    titles = dict(outcome.study.series)
     for planned in outcome.study.runs:
         job = outcome.jobs[planned.id]
         row: dict[str, Value] = {}
@@ -115,6 +118,7 @@ def measure(outcome: Outcome, kinds: Kinds) -> None:
                 row=row,
                 run=run,
                 state=planned.state,
+                series_title=titles.get(planned.series, ""),
             )
         )
 

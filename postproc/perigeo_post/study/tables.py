@@ -125,6 +125,15 @@ def _strain(value: Any) -> Any:
     return value
 
 
+def _spacing(value: Any) -> Any:
+    if _is_formula(value):
+        return _expression(value[1:])
+    number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    if value is not None and (not number or value <= 0):
+        raise wrong("must be a number above 0", "a spacing in m: 0.02")
+    return value
+
+
 def _line(value: Any) -> Any:
     if isinstance(value, list) and len(value) == 4:
         value = [value[:2], value[2:]]
@@ -212,6 +221,7 @@ class LevelTable(_Table):
     title: Text = ""
     strain: Annotated[Any, AfterValidator(_strain)] = None
     line: Annotated[Any, AfterValidator(_line)] = None
+    sampled: Annotated[Any, AfterValidator(_spacing)] = None
     measures: Texts = []
     label: Text = ""
     parameters: dict[ParameterName, Annotated[Any, AfterValidator(_parameter)]] = {}

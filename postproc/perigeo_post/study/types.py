@@ -20,6 +20,9 @@ class State:
 
     strain: float | None = None  # nominal strain; None: the last frame
     line: Line | None = None  # of the profile; None: across the prevailing band
+    sampled: float | None = (
+        None  # spacing of the lattice at which bands are read [m]; None: its own
+    )
 
 
 @dataclass(frozen=True)
@@ -56,6 +59,7 @@ class StudyRun:
     row: Mapping[str, Value]  # what was measured
     run: Run
     state: State = State()
+    series_title: str = ""
 
 
 @dataclass(frozen=True)
