@@ -14,7 +14,9 @@ module pd_motion_keys
     real(wp) :: factor = 0.0_wp
     real(wp) :: relaxing_stiffness = 1.0_wp            !! kappa
     real(wp) :: relaxing_strain = 1.0e-3_wp            !! beta
-  contains
+    real(wp), parameter :: most_increments = 1.0e7_wp
+
+contains
     procedure :: visit => visit_stabilisation
   end type stabilisation_input_t
 
@@ -66,8 +68,8 @@ contains
     call visitor%real_key(key_t('final_strain', unit='1', range=positive, &
       also='only with platens', meaning='nominal strain at which the run ends'), &
       self%final_strain)
-    call visitor%text_key(key_t('time_step_rule', default='spectral', &
-      choices='courant spectral fixed', &
+    call visitor%text_key(key_t('time_step_rule', default='spectral', needs_effect=.true., &
+      choices='courant spectral fixed', also='not at equilibrium', &
       meaning='courant: safety * spacing / c_p; spectral: safety * 2 / (largest frequency); ' &
       //'fixed: time_step'), self%time_step_rule)
     call visitor%real_key(key_t('time_step', unit='s', range=positive, &
@@ -75,12 +77,13 @@ contains
       self%time_step)
     call visitor%real_key(key_t('safety', unit='1', default='0.9', needs_effect=.true., &
       range=range_t(0.0_wp, 10.0_wp, .true., .false.), &
-      also='below 1 for the rule spectral; not with fixed', &
+      also='below 1 for the rule spectral; not with fixed or at equilibrium', &
       meaning='factor on the time step of the rule'), self%safety)
     call visitor%real_key(key_t('damping', unit='kg/(m^3 s)', default='0.0', range=not_negative, &
+      needs_effect=.true., also='not at equilibrium', &
       meaning='force per volume and velocity against the motion, C'), self%damping)
     call visitor%text_key(key_t('damping_frame', default='rest', choices='rest platens', &
-      also='platens: only with platens', &
+      needs_effect=.true., also='platens: only with platens; not at equilibrium', &
       meaning='rest: damping against rest, the body starts at rest; platens: against the ' &
       //'affine velocity between the platens, with which the body also starts'), &
       self%damping_frame)
@@ -88,10 +91,10 @@ contains
       meaning='verlet: motion in time; equilibrium: increments of load and motion, each ' &
       //'brought to rest'), self%method)
     call visitor%real_key(key_t('residual', unit='1', default='1.0e-4', needs_effect=.true., &
-      range=range_t(0.0_wp, 1.0e-2_wp, .true., .false.), also='only for equilibrium', &
+      range=range_t(0.0_wp, 1.0_wp, .true., .true.), also='only for equilibrium', &
       meaning='unbalanced force at rest, over reactions and loads'), self%residual)
     call visitor%integer_key(key_t('increments', unit='1', default='200', needs_effect=.true., &
-      range=positive, also='only for equilibrium', &
+      range=range_t(1.0_wp, most_increments), also='only for equilibrium', &
       meaning='of the run, where none is hard; shorter ones follow where they are'), &
       self%increments)
     call visitor%text_key(key_t('relaxation', default='adaptive', needs_effect=.true., &
