@@ -9,14 +9,14 @@ module pd_motion_keys
 
   public :: stabilisation_input_t, integration_input_t
 
+  real(wp), parameter :: most_increments = 1.0e7_wp
+
   type :: stabilisation_input_t
     character(:), allocatable :: method
     real(wp) :: factor = 0.0_wp
     real(wp) :: relaxing_stiffness = 1.0_wp            !! kappa
     real(wp) :: relaxing_strain = 1.0e-3_wp            !! beta
-    real(wp), parameter :: most_increments = 1.0e7_wp
-
-contains
+  contains
     procedure :: visit => visit_stabilisation
   end type stabilisation_input_t
 

@@ -63,7 +63,8 @@ UNITS = (
     (r"\w+_force_[xy]$", "N/m"),
     (r"mean_stress_", "Pa"),
     (r"\w+_(energy|dissipation|heat|work)$", "J/m"),
-    (r"(step|strain|mean_strain_yy|max_plastic_strain|energy_error|min_det_f|unbalanced_force|damping_share)$", "1"),
+    (r"(step|strain|mean_strain_yy|max_plastic_strain|energy_error|min_det_f)$", "1"),
+    (r"(unbalanced_force|damping_share)$", "1"),
 )
 
 
