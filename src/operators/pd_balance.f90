@@ -1,0 +1,224 @@
+!> Weights for points off a lattice, found at set-up, with which a homogeneous stress is in balance.
+!>
+!> A stress P that is the same everywhere leaves the force density P N_i on point i:
+!>
+!>   N_i = sum_j V_j (g_ij - g_ji)        g_ij = omega K_i^-1 xi: the plain weights
+!>
+!> On a lattice N = 0 where families are whole. Elsewhere the plain weights are changed by as little
+!> as possible, sum_ij V_i V_j |e_ij|^2 / omega least, so that affine motions stay exact and N
+!> becomes T: zero inside; near a free surface N itself, smoothed along the surface, for its noise
+!> would load a surface that is free. Lagrange's multipliers are then a field lambda,
+!>
+!>   e_ij = omega z_ij[lambda]            z_ij[x] = x_j - x_i - H_i[x] xi
+!>   sum_j omega V_j (z_ij[lambda] - z_ji[lambda]) = T_i - N_i
+!>
+!> which is the control of zero-energy modes with the stiffness 1: self-adjoint, never positive.
+!> Conjugate gradients find lambda. Points of boundaries have lambda = 0 and keep their N, which
+!> only reactions feel; so every component of a body that has a boundary has an answer.
+!> Source: doc/theory.md, section 4; Chen, Hillman & Rueter (2013).
+module pd_balance
+  use pd_balanced_list, only: balanced_list_t, new_balanced_list, residual_sums_block
+  use pd_bond_list, only: bond_list_t
+  use pd_kinds, only: block_sum, n_block, wp
+  use pd_operators, only: operators_t
+  use pd_surface, only: find_bare_points, find_near, find_two_families_near, smooth_along_surface
+  implicit none
+  private
+
+  public :: balance_t, look_for_balance, balance_list, left_by_unit_stress
+
+  !> |N_i| sqrt(V_i) that counts as none; 1 at a straight surface.
+  real(wp), parameter :: none = 1.0e-10_wp, tolerance = 1.0e-11_wp
+  !> How often what is left near a surface is spread over families.
+  integer, parameter :: passes = 2
+
+  !> Points of a cloud by where they are, and how much is unbalanced inside: largest |N_i| sqrt(V_i).
+  type :: balance_t
+    logical, allocatable :: in_body(:)   !! not of a boundary (n)
+    logical, allocatable :: zone(:)      !! near a free surface (n)
+    real(wp) :: before = -1.0_wp         !! of the plain weights; below 0: nothing is inside
+    real(wp) :: after = -1.0_wp          !! of the balanced ones; below 0: there are none
+    integer  :: iterations = 0
+  contains
+    procedure :: needed
+  end type balance_t
+
+contains
+
+  !> Whether the plain weights leave something.
+  pure logical function needed(self)
+    class(balance_t), intent(in) :: self
+
+    needed = self%before > none
+  end function needed
+
+  !> Find the surface, and what the plain weights leave inside. Inside is what is more than two
+  !> families from bare points or, where there is no such point, what is not near them.
+  subroutine look_for_balance(list, volume, delta, in_body, balance)
+    type(bond_list_t), intent(inout) :: list        !! with its K^-1
+    real(wp),          intent(in), contiguous :: volume(:)   !! V (n) [m^2]
+    real(wp),          intent(in)    :: delta       !! horizon [m]
+    logical,           intent(in)    :: in_body(:)  !! not of a boundary (n)
+    type(balance_t),   intent(out)   :: balance
+    logical,  allocatable :: bare(:), near(:)
+    real(wp), allocatable :: n(:, :)
+
+    allocate (bare(list%n), near(list%n), balance%zone(list%n), n(list%n, 2))
+    balance%in_body = in_body
+    call find_bare_points(list, bare)
+    call find_near(list, volume, delta, bare .and. in_body, balance%zone)
+    balance%zone = balance%zone .and. in_body
+    call find_two_families_near(list, bare, near)
+    near = near .or. .not. in_body
+    if (all(near)) near = balance%zone .or. .not. in_body
+    if (all(near)) return
+    call left_by_unit_stress(list, n)
+    balance%before = largest_of(n, volume, .not. near)
+  end subroutine look_for_balance
+
+  !> Find lambda, and with it the balanced list.
+  subroutine balance_list(list, volume, delta, balance, balanced)
+    type(bond_list_t),     intent(inout) :: list
+    real(wp),              intent(in), contiguous :: volume(:)   !! V (n) [m^2]
+    real(wp),              intent(in)    :: delta     !! horizon [m]
+    type(balance_t),       intent(inout) :: balance
+    type(balanced_list_t), intent(out)   :: balanced
+    real(wp), allocatable :: lambda(:, :), rest(:, :), left(:, :)
+    integer :: k
+
+    allocate (lambda(list%n, 2), source=0.0_wp)
+    allocate (rest(list%n, 2), left(list%n, 2))
+    call left_by_unit_stress(list, left)
+    associate (inside => balance%in_body .and. .not. balance%zone)
+      ! what is unbalanced inside goes to the surface and the boundaries; N there is smoothed then
+      rest = left
+      call solve(list, volume, inside, lambda, rest, balance%iterations)
+      call residual_force(list, lambda, rest)
+      left = left + rest
+      rest = left
+      where (spread(.not. balance%zone, 2, 2)) rest = 0.0_wp
+      do k = 1, passes
+        call smooth_along_surface(list, volume, delta, balance%zone, rest)
+      end do
+      rest = left - rest
+      call solve(list, volume, balance%in_body, lambda, rest, balance%iterations)
+      call new_balanced_list(list, lambda, balanced)
+      call left_by_unit_stress(balanced, left)
+      balance%after = largest_of(left, volume, inside)
+    end associate
+  end subroutine balance_list
+
+  !> Largest |N_i| sqrt(V_i) of some points.
+  pure real(wp) function largest_of(n, volume, mask) result(largest)
+    real(wp), intent(in) :: n(:, :)     !! (n,2) [1/m]
+    real(wp), intent(in) :: volume(:)   !! V (n) [m^2]
+    logical,  intent(in) :: mask(:)
+
+    largest = maxval(norm2(n, dim=2) * sqrt(volume), mask=mask)
+  end function largest_of
+
+  !> N_i: the force density of a stress of 1, without control. Rows without a point: 0.
+  subroutine left_by_unit_stress(operators, n)
+    class(operators_t), intent(inout) :: operators
+    real(wp),           intent(inout), contiguous :: n(:, :)   !! out: N (n,2) [1/m]
+    real(wp), allocatable :: u(:, :), h(:, :)
+    real(wp) :: p(n_block, 4)
+    integer  :: block, lo
+
+    allocate (u(size(n, 1), 2), h(size(n, 1), 4), source=0.0_wp)
+    p(:, [1, 4]) = 1.0_wp
+    p(:, [2, 3]) = 0.0_wp
+    call operators%take_in(u)
+    do block = 1, operators%domain%blocks%count
+      lo = operators%domain%blocks%lo(block)
+      call operators%hand_over_block(lo, operators%domain%blocks%hi(block), h, p)
+    end do
+    call operators%share()
+    do block = 1, operators%domain%blocks%count
+      call operators%force_block(operators%domain%blocks%lo(block), &
+        operators%domain%blocks%hi(block), u, n)
+    end do
+  end subroutine left_by_unit_stress
+
+  !> Add to lambda, at some points, what makes N there smaller by `rest`. Conjugate gradients in the
+  !> inner product weighted with V, with 1 / W for a preconditioner. They end when
+  !> |rest_i| sqrt(V_i) is below the tolerance everywhere, or after so many steps that they fail.
+  subroutine solve(list, volume, mask, lambda, rest, iterations)
+    type(bond_list_t), intent(in)    :: list
+    real(wp),          intent(in), contiguous :: volume(:)   !! V (n) [m^2]
+    logical,           intent(in)    :: mask(:)              !! where (n)
+    real(wp),          intent(inout), contiguous :: lambda(:, :)   !! (n,2) [1/m^3]
+    real(wp),          intent(inout), contiguous :: rest(:, :)     !! (n,2) [1/m]
+    integer,           intent(inout) :: iterations           !! of all solutions
+    real(wp), allocatable :: way(:, :), image(:, :), scaled(:, :), scale(:)
+    real(wp) :: length, product_now, product_before
+    integer  :: k
+
+    allocate (way(list%n, 2), source=0.0_wp)
+    allocate (image(list%n, 2), scaled(list%n, 2), scale(list%n))
+    scale = merge(1.0_wp / list%weight_sum, 0.0_wp, mask)
+    where (spread(.not. mask, 2, 2)) rest = 0.0_wp
+    product_before = 1.0_wp
+    do k = 1, 500 + list%n
+      if (largest_of(rest, volume, mask) <= tolerance) return
+      iterations = iterations + 1
+      scaled = spread(scale, 2, 2) * rest
+      product_now = inner_product(list, volume, rest, scaled)
+      way = scaled + product_now / product_before * way
+      product_before = product_now
+      call residual_force(list, way, image)
+      where (spread(.not. mask, 2, 2)) image = 0.0_wp
+      length = -product_now / inner_product(list, volume, way, image)
+      lambda = lambda + length * way
+      rest = rest + length * image
+    end do
+  end subroutine solve
+
+  !> The force of the control with stiffness 1: sum_j omega V_j (z_ij - z_ji).
+  subroutine residual_force(list, x, f)
+    type(bond_list_t), intent(in)    :: list
+    real(wp),          intent(in),    contiguous :: x(:, :)   !! (n,2)
+    real(wp),          intent(inout), contiguous :: f(:, :)   !! out: (n,2)
+    real(wp), allocatable :: h(:, :), one(:)
+    integer :: block, lo, hi
+
+    allocate (h(list%n, 4))
+    allocate (one(list%n), source=1.0_wp)
+    !$omp parallel do schedule(static) default(none) private(block, lo, hi) shared(list, x, h)
+    do block = 1, list%domain%blocks%count
+      lo = list%domain%blocks%lo(block)
+      hi = list%domain%blocks%hi(block)
+      call list%gradient_block(lo, hi, x, h)
+    end do
+    !$omp end parallel do
+    !$omp parallel do schedule(static) default(none) private(block, lo, hi) shared(list, x, h, f, one)
+    do block = 1, list%domain%blocks%count
+      lo = list%domain%blocks%lo(block)
+      hi = list%domain%blocks%hi(block)
+      f(lo:hi, :) = 0.0_wp
+      call residual_sums_block(list, lo, hi, one, x, h, f)
+    end do
+    !$omp end parallel do
+  end subroutine residual_force
+
+  !> sum V a . b, block by block: the same bits for any number of threads.
+  real(wp) function inner_product(list, volume, a, b) result(total)
+    type(bond_list_t), intent(in) :: list
+    real(wp),          intent(in), contiguous :: volume(:)         !! V (n) [m^2]
+    real(wp),          intent(in), contiguous :: a(:, :), b(:, :)  !! (n,2)
+    real(wp), allocatable :: parts(:)
+    real(wp) :: terms(n_block)
+    integer  :: block, lo, hi
+
+    allocate (parts(list%domain%blocks%count))
+    do block = 1, list%domain%blocks%count
+      lo = list%domain%blocks%lo(block)
+      hi = list%domain%blocks%hi(block)
+      terms = 0.0_wp
+      terms(:hi - lo + 1) = volume(lo:hi) * (a(lo:hi, 1) * b(lo:hi, 1) + a(lo:hi, 2) * b(lo:hi, 2))
+      parts(block) = block_sum(terms)
+    end do
+    total = list%domain%blocks%total(parts)
+  end function inner_product
+
+end module pd_balance
