@@ -13,13 +13,14 @@
 !>   sum_j omega V_j (z_ij[lambda] - z_ji[lambda]) = T_i - N_i
 !>
 !> which is the control of zero-energy modes with the stiffness 1: self-adjoint, never positive.
-!> Conjugate gradients find lambda. Points of boundaries have lambda = 0 and keep their N, which
-!> only reactions feel; so every component of a body that has a boundary has an answer.
+!> Conjugate gradients find lambda. Points of boundaries have lambda = 0, and their N, which only
+!> reactions feel, takes up what there is to take.
 !> Source: doc/theory.md, section 4; Chen, Hillman & Rueter (2013).
 module pd_balance
   use pd_balanced_list, only: balanced_list_t, new_balanced_list, residual_sums_block
   use pd_bond_list, only: bond_list_t
-  use pd_kinds, only: block_sum, n_block, wp
+  use pd_kinds, only: block_sum, i8, n_block, wp
+  use pd_long_waves, only: long_waves_t, new_long_waves, probes
   use pd_operators, only: operators_t
   use pd_surface, only: find_bare_points, find_near, find_two_families_near, smooth_along_surface
   implicit none
@@ -84,6 +85,7 @@ contains
     type(balance_t),       intent(inout) :: balance
     type(balanced_list_t), intent(out)   :: balanced
     real(wp), allocatable :: lambda(:, :), rest(:, :), left(:, :)
+    logical,  allocatable :: moves(:)
     integer :: k
 
     allocate (lambda(list%n, 2), source=0.0_wp)
@@ -92,7 +94,7 @@ contains
     associate (inside => balance%in_body .and. .not. balance%zone)
       ! what is unbalanced inside goes to the surface and the boundaries; N there is smoothed then
       rest = left
-      call solve(list, volume, inside, lambda, rest, balance%iterations)
+      call solve(list, volume, delta, inside, lambda, rest, balance%iterations)
       call residual_force(list, lambda, rest)
       left = left + rest
       rest = left
@@ -101,12 +103,77 @@ contains
         call smooth_along_surface(list, volume, delta, balance%zone, rest)
       end do
       rest = left - rest
-      call solve(list, volume, balance%in_body, lambda, rest, balance%iterations)
+      moves = balance%in_body
+      call hold_free_pieces(list, moves)
+      call solve(list, volume, delta, moves, lambda, rest, balance%iterations)
       call new_balanced_list(list, lambda, balanced)
       call left_by_unit_stress(balanced, left)
       balance%after = largest_of(left, volume, inside)
     end associate
   end subroutine balance_list
+
+  !> Take three points out of the mask in every piece of the body that is wholly in it: an affine
+  !> lambda does nothing. If all others have what they should, so have these, for sum and first
+  !> moments of N are given.
+  subroutine hold_free_pieces(list, mask)
+    type(bond_list_t), intent(in)    :: list
+    logical,           intent(inout) :: mask(:)   !! (n)
+    integer, allocatable :: piece(:)
+    integer  :: i, n
+    real(wp) :: arm(2)
+
+    allocate (piece(list%n), source=0)
+    n = 0
+    do i = 1, list%n
+      if (piece(i) > 0) cycle
+      n = n + 1
+      call mark_piece(list, i, n, piece)
+      if (.not. all(mask .or. piece /= n)) cycle
+      associate (x => list%position)
+        mask(i) = .false.
+        ! the point farthest from it, and that farthest from the line between the two
+        arm = x(farthest((x(:, 1) - x(i, 1))**2 + (x(:, 2) - x(i, 2))**2), :) - x(i, :)
+        mask(farthest((x(:, 1) - x(i, 1))**2 + (x(:, 2) - x(i, 2))**2)) = .false.
+        mask(farthest(abs((x(:, 1) - x(i, 1)) * arm(2) - (x(:, 2) - x(i, 2)) * arm(1)))) = .false.
+      end associate
+    end do
+
+  contains
+
+    !> The point of piece n where a number is largest.
+    integer function farthest(number)
+      real(wp), intent(in) :: number(:)
+
+      farthest = maxloc(number, dim=1, mask=piece == n)
+    end function farthest
+
+  end subroutine hold_free_pieces
+
+  !> Give a number to all points that are tied to point i through bonds.
+  subroutine mark_piece(list, i, number, piece)
+    type(bond_list_t), intent(in)    :: list
+    integer,           intent(in)    :: i, number
+    integer,           intent(inout) :: piece(:)   !! 0: not marked yet (n)
+    integer, allocatable :: found(:)
+    integer     :: j, k, n_found
+    integer(i8) :: b
+
+    allocate (found(list%n))
+    found(1) = i
+    n_found = 1
+    piece(i) = number
+    k = 0
+    do while (k < n_found)
+      k = k + 1
+      do b = list%first(found(k)), list%first(found(k) + 1) - 1
+        j = list%neighbour(b)
+        if (piece(j) > 0) cycle
+        piece(j) = number
+        n_found = n_found + 1
+        found(n_found) = j
+      end do
+    end do
+  end subroutine mark_piece
 
   !> Largest |N_i| sqrt(V_i) of some points.
   pure real(wp) function largest_of(n, volume, mask) result(largest)
@@ -141,28 +208,35 @@ contains
   end subroutine left_by_unit_stress
 
   !> Add to lambda, at some points, what makes N there smaller by `rest`. Conjugate gradients in the
-  !> inner product weighted with V, with 1 / W for a preconditioner. They end when
-  !> |rest_i| sqrt(V_i) is below the tolerance everywhere, or after so many steps that they fail.
-  subroutine solve(list, volume, mask, lambda, rest, iterations)
+  !> inner product weighted with V; for a preconditioner 1 / (2 W) and the answer in long waves. They
+  !> end when |rest_i| sqrt(V_i) is below the tolerance everywhere, or after so many steps that they
+  !> have failed.
+  subroutine solve(list, volume, delta, mask, lambda, rest, iterations)
     type(bond_list_t), intent(in)    :: list
     real(wp),          intent(in), contiguous :: volume(:)   !! V (n) [m^2]
+    real(wp),          intent(in)    :: delta                !! horizon [m]
     logical,           intent(in)    :: mask(:)              !! where (n)
     real(wp),          intent(inout), contiguous :: lambda(:, :)   !! (n,2) [1/m^3]
     real(wp),          intent(inout), contiguous :: rest(:, :)     !! (n,2) [1/m]
     integer,           intent(inout) :: iterations           !! of all solutions
+    integer, parameter :: most = 5000
     real(wp), allocatable :: way(:, :), image(:, :), scaled(:, :), scale(:)
+    type(long_waves_t) :: waves
     real(wp) :: length, product_now, product_before
     integer  :: k
 
-    allocate (way(list%n, 2), source=0.0_wp)
-    allocate (image(list%n, 2), scaled(list%n, 2), scale(list%n))
-    scale = merge(1.0_wp / list%weight_sum, 0.0_wp, mask)
+    if (.not. any(mask)) return
+    allocate (way(list%n, 2), image(list%n, 2), scaled(list%n, 2), scale(list%n))
+    call find_long_waves(list, volume, delta, mask, waves)
+    scale = merge(0.5_wp / list%weight_sum, 0.0_wp, mask)
     where (spread(.not. mask, 2, 2)) rest = 0.0_wp
+    way = 0.0_wp
     product_before = 1.0_wp
-    do k = 1, 500 + list%n
+    do k = 1, most
       if (largest_of(rest, volume, mask) <= tolerance) return
       iterations = iterations + 1
       scaled = spread(scale, 2, 2) * rest
+      call waves%correct(rest, scaled)
       product_now = inner_product(list, volume, rest, scaled)
       way = scaled + product_now / product_before * way
       product_before = product_now
@@ -173,6 +247,28 @@ contains
       rest = rest + length * image
     end do
   end subroutine solve
+
+  !> The control with stiffness 1, seen by long waves. It reaches two horizons far.
+  subroutine find_long_waves(list, volume, delta, mask, waves)
+    type(bond_list_t),  intent(in)  :: list
+    real(wp),           intent(in), contiguous :: volume(:)   !! V (n) [m^2]
+    real(wp),           intent(in)  :: delta                  !! horizon [m]
+    logical,            intent(in)  :: mask(:)                !! points that may move (n)
+    type(long_waves_t), intent(out) :: waves
+    real(wp), parameter :: two_horizons = 2.001_wp   ! and the tolerance of a horizon
+    real(wp), allocatable :: field(:, :), image(:, :)
+    integer :: k
+
+    allocate (field(list%n, 2), image(list%n, 2))
+    waves = new_long_waves(list%position, volume, mask, two_horizons * delta)
+    do k = 1, probes
+      call waves%probe(k, field)
+      call residual_force(list, field, image)
+      image = -image
+      call waves%take_image(k, image)
+    end do
+    call waves%factorise()
+  end subroutine find_long_waves
 
   !> The force of the control with stiffness 1: sum_j omega V_j (z_ij - z_ji).
   subroutine residual_force(list, x, f)
