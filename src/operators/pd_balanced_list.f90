@@ -25,7 +25,7 @@ module pd_balanced_list
   type, extends(bond_list_t) :: balanced_list_t
     real(wp), allocatable, private :: bx(:), by(:)     !! b (bonds) [m^3]
     real(wp), allocatable, private :: own(:, :)        !! sum_j w_ij (n,2) [m^3]
-    real(wp), allocatable, private :: plain(:, :)      !! H^0 (n,4) xx xy yx yy
+    real(wp), allocatable, private :: affine(:, :)     !! c H^0 (n,4) xx xy yx yy [N/m^6]
   contains
     procedure :: take_in
     procedure :: divergence_sums_block
@@ -84,21 +84,24 @@ contains
     z(2) = step(2) - h(3) * xi(1) - h(4) * xi(2)
   end subroutine residual
 
-  !> Make u readable for the sums, and for the control find H^0.
+  !> Make u readable for the sums, and for the control find c H^0.
   subroutine take_in(self, u)
     class(balanced_list_t), intent(inout) :: self
     real(wp), intent(inout), contiguous :: u(:, :)   !! (n,2) [m]; its halo is brought up to date
-    integer :: block, lo, hi
+    integer :: block, lo, hi, k
 
     call self%bond_list_t%take_in(u)
     if (.not. allocated(self%control)) return
-    if (.not. allocated(self%plain)) allocate (self%plain(self%n, 4))
-    !$omp parallel do schedule(static) default(none) shared(self, u) private(block, lo, hi)
+    if (.not. allocated(self%affine)) allocate (self%affine(self%n, 4))
+    !$omp parallel do schedule(static) default(none) shared(self, u) private(block, lo, hi, k)
     do block = 1, self%domain%blocks%count
       lo = self%domain%blocks%lo(block)
       hi = self%domain%blocks%hi(block)
-      call plain_gradient_sums(self, lo, hi, u, self%plain)
-      call times_k_inverse(lo, hi, self%k_inverse, self%plain)
+      call plain_gradient_sums(self, lo, hi, u, self%affine)
+      call times_k_inverse(lo, hi, self%k_inverse, self%affine)
+      do k = 1, 4
+        self%affine(lo:hi, k) = self%control(lo:hi) * self%affine(lo:hi, k)
+      end do
     end do
     !$omp end parallel do
   end subroutine take_in
@@ -163,16 +166,16 @@ contains
     real(wp), intent(in),    contiguous :: u(:, :)   !! (n,2) [m]
     real(wp), intent(inout), contiguous :: f(:, :)   !! (n,2) [N/m^3]
 
-    call residual_sums_block(self, lo, hi, self%control, u, self%plain, f)
+    call residual_sums_block(self, lo, hi, self%control, u, self%affine, f)
   end subroutine control_sums_block
 
-  !> The same with any stiffness and H^0.
-  pure subroutine residual_sums_block(list, lo, hi, c, u, h, f)
+  !> The same with any stiffness c and its c H^0.
+  pure subroutine residual_sums_block(list, lo, hi, c, u, ch, f)
     class(bond_list_t), intent(in) :: list
     integer,  intent(in) :: lo, hi
     real(wp), intent(in),    contiguous :: c(:)      !! (n)
     real(wp), intent(in),    contiguous :: u(:, :)   !! (n,2)
-    real(wp), intent(in),    contiguous :: h(:, :)   !! H^0 of u (n,4) xx xy yx yy
+    real(wp), intent(in),    contiguous :: ch(:, :)  !! c H^0 of u (n,4) xx xy yx yy
     real(wp), intent(inout), contiguous :: f(:, :)   !! (n,2)
     integer     :: i, j
     integer(i8) :: b
@@ -187,9 +190,9 @@ contains
         y = list%position(j, 2) - list%position(i, 2)
         both = c(i) + c(j)
         fx = fx + list%weight(b) * (both * (u(j, 1) - u(i, 1)) &
-          - (c(i) * h(i, 1) + c(j) * h(j, 1)) * x - (c(i) * h(i, 2) + c(j) * h(j, 2)) * y)
+          - (ch(i, 1) + ch(j, 1)) * x - (ch(i, 2) + ch(j, 2)) * y)
         fy = fy + list%weight(b) * (both * (u(j, 2) - u(i, 2)) &
-          - (c(i) * h(i, 3) + c(j) * h(j, 3)) * x - (c(i) * h(i, 4) + c(j) * h(j, 4)) * y)
+          - (ch(i, 3) + ch(j, 3)) * x - (ch(i, 4) + ch(j, 4)) * y)
       end do
       f(i, 1) = f(i, 1) + fx
       f(i, 2) = f(i, 2) + fy

@@ -184,6 +184,27 @@ def cost(n: int, weights: str) -> tuple[float, float, float]:
     return best, float(stable[1]), float(left[1])
 
 
+def step(weights: str, control: str) -> float:
+    """Milliseconds of one of 1000 steps of the elastic specimen of 40 x 80 cells."""
+    name = f"step_{weights}_{control.split(',')[0]}"
+    cloud(RESULTS / name / "points.txt", 40, 80, (0, 3), 0.2)
+    result = run(
+        name,
+        [
+            *specimen(40, 0.2, weights),
+            verify.material("elastic"),
+            ("stabilisation", CONTROLS[control]),
+            ("integration", {"end_time": 0.1, "time_step_rule": "fixed", "time_step": 1.0e-4}),
+            ("output", {"history_count": 1, "frame_count": 1}),
+        ],
+    )
+    log = (RESULTS / name / f"{name}.log").read_text()
+    found = re.search(r"time loop +(\S+) s", log)
+    if found is None or not result.complete:
+        raise RuntimeError(f"{name}: the log does not say how long the steps took")
+    return float(found[1])
+
+
 def percent(value: float) -> str:
     """A deviation from 1; round-off is 0."""
     off = 100.0 * (value - 1.0)
@@ -245,6 +266,18 @@ def cost_table() -> list[list[str]]:
     return rows
 
 
+def step_table() -> list[list[str]]:
+    """The best of five runs, by turns."""
+    rows = [["control", "step, plain", "balanced"]]
+    for control in CONTROLS:
+        plain, balanced = np.inf, np.inf
+        for _ in range(5):
+            plain = min(plain, step("plain", control))
+            balanced = min(balanced, step("balanced", control))
+        rows.append([control, f"{plain:.2f} ms", f"{balanced:.2f} ms"])
+    return rows
+
+
 def text_of(rows: list[list[str]]) -> str:
     lines = ["| " + " | ".join(row) + " |" for row in rows]
     lines.insert(1, "|" + "---|" * len(rows[0]))
@@ -269,6 +302,8 @@ def main() -> int:
             text_of(compression_table()),
             "Set-up (`--check`, best of three), m = 3, jitter 0.2 dx:",
             text_of(cost_table()),
+            "A step of 3440 points, elastic, m = 3 (best of five, by turns):",
+            text_of(step_table()),
         ]
     )
     print(text)
