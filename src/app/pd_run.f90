@@ -117,13 +117,13 @@ contains
         'families come out wrong', '&body file')
       if (run%input%stabilisation%method /= 'none') return
       if (left(1) > hardly_any .and. (left(2) < 0.0_wp .or. left(2) > hardly_any)) then
-        call run%warnings%add('points off a lattice without control: a homogeneous stress is not '// &
-          'in equilibrium inside them, and stresses come out much too small; balanced weights '// &
-          'and a control of zero-energy modes help', '&stabilisation method')
+        call run%warnings%add('points off a lattice without control: a homogeneous stress is '// &
+          'not in equilibrium inside them, and stresses come out much too small; balanced '// &
+          'weights and a control of zero-energy modes help', '&stabilisation method')
       else
         call run%warnings%add('points off a lattice without control: where they flow, '// &
-          'zero-energy modes carry a part of the displacement, and loads come out some per cent '// &
-          'too small; a control helps', '&stabilisation method')
+          'zero-energy modes carry a part of the displacement, and loads come out some per '// &
+          'cent too small; a control helps', '&stabilisation method')
       end if
     end associate
   end subroutine look_at_cloud

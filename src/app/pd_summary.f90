@@ -97,8 +97,8 @@ contains
 
     if (model%unbalanced(1) < 0.0_wp) return
     text = number(model%unbalanced(1))
-    if (model%unbalanced(2) >= 0.0_wp) text = number(model%unbalanced(2))//', with plain weights '// &
-      text
+    if (model%unbalanced(2) >= 0.0_wp) &
+      text = number(model%unbalanced(2))//', with plain weights '//text
     call summary%add('imbalance', text// &
       ': the force that a homogeneous stress leaves on a point inside, at most, over that at a '// &
       'surface; 0 on a lattice')

@@ -33,7 +33,7 @@ module pd_balance
   !> How often what is left near a surface is spread over families.
   integer, parameter :: passes = 2
 
-  !> Points of a cloud by where they are, and how much is unbalanced inside: largest |N_i| sqrt(V_i).
+  !> Points of a cloud by where they are, and what is unbalanced inside: largest |N_i| sqrt(V_i).
   type :: balance_t
     logical, allocatable :: in_body(:)   !! not of a boundary (n)
     logical, allocatable :: zone(:)      !! near a free surface (n)
@@ -208,9 +208,9 @@ contains
   end subroutine left_by_unit_stress
 
   !> Add to lambda, at some points, what makes N there smaller by `rest`. Conjugate gradients in the
-  !> inner product weighted with V; for a preconditioner 1 / (2 W) and the answer in long waves. They
-  !> end when |rest_i| sqrt(V_i) is below the tolerance everywhere, or after so many steps that they
-  !> have failed.
+  !> inner product weighted with V; for a preconditioner 1 / (2 W) and the answer in long waves.
+  !> They end when |rest_i| sqrt(V_i) is below the tolerance everywhere, or after so many steps that
+  !> they have failed.
   subroutine solve(list, volume, delta, mask, lambda, rest, iterations)
     type(bond_list_t), intent(in)    :: list
     real(wp),          intent(in), contiguous :: volume(:)   !! V (n) [m^2]
@@ -287,7 +287,8 @@ contains
       call list%gradient_block(lo, hi, x, h)
     end do
     !$omp end parallel do
-    !$omp parallel do schedule(static) default(none) private(block, lo, hi) shared(list, x, h, f, one)
+    !$omp parallel do schedule(static) default(none) private(block, lo, hi) &
+    !$omp shared(list, x, h, f, one)
     do block = 1, list%domain%blocks%count
       lo = list%domain%blocks%lo(block)
       hi = list%domain%blocks%hi(block)

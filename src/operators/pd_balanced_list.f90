@@ -4,9 +4,9 @@
 !>   H_i = sum_j V_j (u_j - u_i) (x) g_ij         f_i = sum_j V_j (P_i g_ij - P_j g_ji)
 !>
 !> The field lambda is that of `pd_balance`. Residuals have no moment, sum_j omega V_j z_ij (x) xi
-!> = 0: affine motions stay exact, and K is what it was. The force is minus the adjoint of H: momentum
-!> and moments stay exact. The bonds hold w_ij = V_j K_i g_ij, as those of the plain list do, and
-!> the weight with which they are seen from the other end, b_ij = -(V_j K_j g_ji):
+!> = 0: affine motions stay exact, and K is what it was. The force is minus the adjoint of H, so
+!> momentum and moments stay exact. The bonds hold w_ij = V_j K_i g_ij, as those of the plain list
+!> do, and the weight with which they are seen from the other end, b_ij = -(V_j K_j g_ji):
 !>
 !>   G[u]_i = sum_j (u_j - u_i) (x) w_ij          D[A]_i = A_i sum_j w_ij + sum_j A_j b_ij
 !>

@@ -1,4 +1,4 @@
-!> Where a cloud of points ends, found from its families alone, and fields smoothed along its surface.
+!> Where a cloud of points ends, found from its families alone; fields smoothed along its surface.
 !>
 !> A point is bare if a third of the directions around it holds no bond. What is within a horizon,
 !> less half the distance of points, of a bare point has a family that is cut off.

@@ -295,7 +295,7 @@ def patch_cloud(jitter):
     lines = []
     for i in range(16):
         for j in range(16):
-            name = "" if 3 <= min(i, j) and max(i, j) < 13 else " rim"
+            name = "" if min(i, j) >= 3 and max(i, j) < 13 else " rim"
             x, y = 0.1 * i + way[i, j, 0], 0.1 * j + way[i, j, 1]
             lines.append(f"{x:.9f} {y:.9f} 0.01{name}")
     return "\n".join([*lines, ""])
@@ -312,9 +312,7 @@ def mean_shear(folder):
 
 @pytest.mark.parametrize("jitter", [0.05, 0.2, 0.4])
 @pytest.mark.parametrize("control", ["none", "silling", "relaxing"])
-def test_a_cloud_at_rest_in_homogeneous_shear_has_its_stress(
-    run_case, tmp_path, jitter, control
-):
+def test_a_cloud_at_rest_in_homogeneous_shear_has_its_stress(run_case, tmp_path, jitter, control):
     (tmp_path / "cloud.txt").write_text(patch_cloud(jitter))
     text = changed(PATCH, method=f"'{control}'" + (", factor = 0.1" * (control == "silling")))
     done = run_case(text, tmp_path, "--threads", "1")

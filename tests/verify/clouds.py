@@ -20,7 +20,7 @@ from pathlib import Path
 import numpy as np
 import verify
 from perigeo_post import Run, apparent_modulus, stress_strain
-from verify import E, PROGRAM, ROOT, ROOT_3, SIGMA_Y, Groups, G
+from verify import PROGRAM, ROOT, ROOT_3, SIGMA_Y, E, G, Groups
 
 RESULTS = ROOT / "results" / "clouds"
 SHEAR = 1.0e-3
@@ -288,10 +288,9 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--publish", action="store_true", help="put them into doc/model.md")
     arguments = parser.parse_args()
-    cpu = next(
-        (line.split(":")[1].strip() for line in open("/proc/cpuinfo") if "model name" in line),
-        platform.machine(),
-    )
+    cpuinfo = Path("/proc/cpuinfo")
+    names = re.findall(r"model name\s*: (.*)", cpuinfo.read_text() if cpuinfo.exists() else "")
+    cpu = names[0] if names else platform.machine()
     text = "\n\n".join(
         [
             f"{date.today().isoformat()}, {cpu}, one thread.",
