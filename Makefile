@@ -52,7 +52,7 @@ build    := build/$(BUILD)
 studies := fig3a fig3b fig4 fig5 seeds horizon loading size softening influence heterogeneity
 .PHONY: all program objects post debug units demo demo-quick test lint verify \
   layers setup install help clean distclean figures $(studies) \
-  report report-view site bench
+  report report-view site bench clouds
 .DEFAULT_GOAL := all
 
 help_width := 13
@@ -126,6 +126,11 @@ verify:            ## compare computed values with closed forms, printed as a ta
 	@$(submake) $(parallel) program
 	@$(venv)/bin/python tests/verify/verify.py $(if $(PUBLISH),--publish)
 
+clouds:            ## points off a lattice: stress, compression, cost; PUBLISH=1: doc/model.md
+	@sh tools/setup.sh test
+	@$(submake) $(parallel) program
+	@$(venv)/bin/python tests/verify/clouds.py $(if $(PUBLISH),--publish)
+
 bench:             ## measure the speed on this machine; PUBLISH=1: into doc/performance.md
 	@sh tools/setup.sh test
 	@$(submake) $(parallel) program build/opt/bench/machine
@@ -158,7 +163,7 @@ help:              ## list the targets
 # ---------------------------------------------------------------------------------- compiling
 # The rest needs the compiler and HDF5, which `make demo` may have to install first.
 ifneq ($(filter-out setup demo demo-quick test debug lint verify layers help clean \
-  distclean figures $(studies) report report-view site bench,\
+  distclean figures $(studies) report report-view site bench clouds,\
   $(or $(MAKECMDGOALS),all)),)
 
 ifeq ($(shell command -v $(firstword $(FC)) 2>/dev/null),)

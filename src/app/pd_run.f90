@@ -122,11 +122,30 @@ contains
           materials%list(k)%name//'''; &body material chooses one', path)
       end do
     end associate
-    if (.not. allocated(run%model%body%place) .and. run%input%stabilisation%method == 'none') &
-      call run%warnings%add('points off a lattice without control: a homogeneous stress is not '// &
-      'in equilibrium inside them, and stresses come out too small; a control of zero-energy '// &
-      'modes helps', '&stabilisation method')
+    if (.not. allocated(run%model%body%place)) call look_at_cloud(run)
   end subroutine look_at_model
+
+  !> Warn of a cloud of points whose weights or zero-energy modes make stresses too small.
+  subroutine look_at_cloud(run)
+    type(run_t), intent(inout) :: run
+    real(wp), parameter :: hardly_any = 1.0e-6_wp
+
+    associate (left => run%model%unbalanced)
+      if (left(2) > hardly_any) call run%warnings%add('no weights were found with which a '// &
+        'homogeneous stress is in equilibrium inside the cloud: stresses near points of uneven '// &
+        'families come out wrong', '&body file')
+      if (run%input%stabilisation%method /= 'none') return
+      if (left(1) > hardly_any .and. (left(2) < 0.0_wp .or. left(2) > hardly_any)) then
+        call run%warnings%add('points off a lattice without control: a homogeneous stress is '// &
+          'not in equilibrium inside them, and stresses come out much too small; balanced '// &
+          'weights and a control of zero-energy modes help', '&stabilisation method')
+      else
+        call run%warnings%add('points off a lattice without control: where they flow, '// &
+          'zero-energy modes carry a part of the displacement, and loads come out some per '// &
+          'cent too small; a control helps', '&stabilisation method')
+      end if
+    end associate
+  end subroutine look_at_cloud
 
   !> Results of an earlier run are overwritten or continued only on request; a checkpoint is read
   !> if the run continues from it.

@@ -63,9 +63,7 @@ contains
       call summary%add('bonds', number(bonds)//'; per point '// &
         number(bonds / real(body%n, wp))// &
         ' on average, '//whole(fewest)//' at least')
-      if (model%unbalanced >= 0.0_wp) call summary%add('imbalance', number(model%unbalanced)// &
-        ': the force that a homogeneous stress leaves on a point inside, at most, over that at '// &
-        'a surface; 0 on a lattice')
+      call add_imbalance(model, summary)
       call summary%add('horizon', number(model%delta)//' m, spacing '// &
         number(model%spacing)//' m: m = '//number(model%delta / model%spacing))
       call summary%add('wave speed', 'c_p = '//number(model%materials%wave_speed())//' m/s')
@@ -108,6 +106,21 @@ contains
     if (model%highest_frequency > 0.0_wp) call summary%add('stable step', &
       '2/omega_max = '//number(2.0_wp / model%highest_frequency)//' s, of the elastic body')
   end subroutine add_time_step
+
+  !> How far a homogeneous stress is from equilibrium inside a cloud.
+  subroutine add_imbalance(model, summary)
+    type(model_t),   intent(in)    :: model
+    type(summary_t), intent(inout) :: summary
+    character(:), allocatable :: text
+
+    if (model%unbalanced(1) < 0.0_wp) return
+    text = number(model%unbalanced(1))
+    if (model%unbalanced(2) >= 0.0_wp) &
+      text = number(model%unbalanced(2))//', with plain weights '//text
+    call summary%add('imbalance', text// &
+      ': the force that a homogeneous stress leaves on a point inside, at most, over that at a '// &
+      'surface; 0 on a lattice')
+  end subroutine add_imbalance
 
   !> The random field, and its statistics in every material that yields.
   subroutine add_field(input, model, summary)

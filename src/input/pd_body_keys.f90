@@ -12,7 +12,7 @@ module pd_body_keys
   type :: discretisation_input_t
     real(wp) :: spacing = unset                        !! [m]
     real(wp) :: horizon = unset                        !! [m]
-    character(:), allocatable :: layout, volumes, influence, fit
+    character(:), allocatable :: layout, volumes, influence, fit, cloud_weights
   contains
     procedure :: visit => visit_discretisation
   end type discretisation_input_t
@@ -59,6 +59,11 @@ contains
       also='not with shape = ''file''', &
       meaning='extents that are no multiples of spacing: exact: an error that names the ' &
       //'nearest; nearest: adjusted, with a warning'), self%fit)
+    call visitor%text_key(key_t('cloud_weights', default='balanced', needs_effect=.true., &
+      choices='balanced plain', &
+      also='only with shape = ''file''', &
+      meaning='balanced: a homogeneous stress is in equilibrium inside a cloud of points; plain: ' &
+      //'it is not, and stresses come out too small'), self%cloud_weights)
   end subroutine visit_discretisation
 
   subroutine visit_body(self, visitor)

@@ -95,6 +95,7 @@ contains
       call add_useless(group, 'fit', 'on a point cloud', errors)
       return
     end if
+    call add_useless(group, 'cloud_weights', 'on a lattice', errors)
     associate (d => input%discretisation)
       if (.not. (is_set(d%spacing) .and. is_set(d%horizon))) return
       if (d%horizon < d%spacing*(1.0_wp - lattice_tolerance)) then

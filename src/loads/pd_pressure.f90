@@ -5,7 +5,8 @@
 !> Loads on the outermost points alone would put several times the stress there.
 !> Source: doc/theory.md, section 7.
 module pd_pressure
-  use pd_kinds, only: n_block, wp
+  use pd_balance, only: left_by_unit_stress
+  use pd_kinds, only: wp
   use pd_loads, only: load_t
   use pd_operators, only: operators_t
   use pd_point_sets, only: side_t
@@ -56,26 +57,10 @@ contains
     class(operators_t), intent(inout) :: operators
     real(wp),           intent(in),  contiguous :: volume(:)       !! V (n) [m^2]
     real(wp),           intent(inout), contiguous :: vectors(:, :) !! out: N (n,2) [m]
-    real(wp), allocatable :: u(:, :), h(:, :)
-    real(wp) :: p(n_block, 4)
-    integer  :: block, lo, hi
 
-    allocate (u(size(volume), 2), h(size(volume), 4), source=0.0_wp)
-    p(:, [1, 4]) = 1.0_wp
-    p(:, [2, 3]) = 0.0_wp
-    call operators%take_in(u)
-    do block = 1, operators%domain%blocks%count
-      lo = operators%domain%blocks%lo(block)
-      call operators%hand_over_block(lo, operators%domain%blocks%hi(block), h, p)
-    end do
-    call operators%share()
-    do block = 1, operators%domain%blocks%count
-      lo = operators%domain%blocks%lo(block)
-      hi = operators%domain%blocks%hi(block)
-      call operators%force_block(lo, hi, u, vectors)
-      vectors(lo:hi, 1) = volume(lo:hi) * vectors(lo:hi, 1)
-      vectors(lo:hi, 2) = volume(lo:hi) * vectors(lo:hi, 2)
-    end do
+    call left_by_unit_stress(operators, vectors)
+    vectors(:, 1) = volume * vectors(:, 1)
+    vectors(:, 2) = volume * vectors(:, 2)
   end subroutine surface_vectors
 
   !> Pressure on a part of a side, not yet divided among the points.

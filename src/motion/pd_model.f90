@@ -33,8 +33,9 @@ module pd_model
     logical  :: at_equilibrium = .false.     !! time only tells how far loads and supports are
     logical  :: damped_in_frame = .false.    !! damping acts in the frame of the platens
     real(wp) :: highest_frequency = 0.0_wp   !! of the linearised operator [1/s]; 0: not asked for
-    real(wp) :: unbalanced = -1.0_wp         !! largest |N_i| / sqrt(V_i) inside a cloud of points;
-                                             !! below 0: a lattice, or nothing is inside
+    real(wp) :: unbalanced(2) = -1.0_wp      !! what a stress of 1 leaves inside a cloud of points
+                                             !! with plain and with balanced weights, at most;
+                                             !! below 0: a lattice, nothing inside, not balanced
   end type model_t
 
   !> Velocity against which the damping acts: linear between two ends, constant beyond them.

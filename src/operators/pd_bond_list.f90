@@ -18,12 +18,12 @@ module pd_bond_list
 
   !> Bond list of all points, with the weights that belong to the bonds.
   type, extends(operators_t) :: bond_list_t
-    integer(i8), allocatable, private :: first(:)      !! first bond of point i (n+1)
-    integer,     allocatable, private :: neighbour(:)  !! j (bonds)
-    real(wp),    allocatable, private :: wx(:), wy(:)  !! omega V_j xi (bonds) [m^3]
-    real(wp),    allocatable, private :: weight(:)     !! omega V_j (bonds) [m^2]
-    real(wp), allocatable, private :: residual_weight(:)   !! w~ (bonds) [m^2]
-    real(wp),    allocatable, private :: position(:, :)  !! X (n,2) [m]
+    integer(i8), allocatable :: first(:)      !! first bond of point i (n+1)
+    integer,     allocatable :: neighbour(:)  !! j (bonds)
+    real(wp),    allocatable :: wx(:), wy(:)  !! omega V_j xi (bonds) [m^3]
+    real(wp),    allocatable :: weight(:)     !! omega V_j (bonds) [m^2]
+    real(wp),    allocatable, private :: residual_weight(:)   !! w~ (bonds) [m^2]
+    real(wp),    allocatable :: position(:, :)  !! X (n,2) [m]
   contains
     procedure :: gradient_sums_block
     procedure :: divergence_sums_block

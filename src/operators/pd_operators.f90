@@ -19,10 +19,9 @@
 !>   share()                             the sums can read A
 !>   force_block(lo, hi, u, f)           for every block
 !>
-!> Two realisations: `pd_bond_list` for any points, `pd_lattice` for bodies on a lattice. Set-up
-!> chooses; nothing else knows which it is. A realisation provides the sums G, D, Z and S. Where its
-!> weights leave out the volume of the neighbour, the fields are multiplied by its share of a whole
-!> cell before they are summed.
+!> Realisations: `pd_bond_list` for any points, `pd_balanced_list` off lattices, `pd_lattice` on
+!> them. Set-up chooses; nothing else knows which. Each provides the sums G, D, Z and S. Where its
+!> weights leave out the volume of the neighbour, fields are first multiplied by its share.
 !> Source: doc/theory.md, sections 2, 4 and 5.
 module pd_operators
   use pd_blocks, only: blocks_t
@@ -46,6 +45,7 @@ module pd_operators
     real(wp), allocatable :: weight_sum(:)                !! W_i = sum_j omega V_j (n) [m^2]
     real(wp), allocatable :: k_inverse(:, :)              !! K^-1 (n,3) xx yy xy [1/m^4]
     real(wp), allocatable :: control(:)                   !! c (n) [N/m^6]; not allocated: none
+    logical :: sums_whole_control = .false.               !! Z holds the affine part too
     type(relaxing_t), allocatable :: relaxing             !! not allocated: none
     real(wp), allocatable, private :: force_tensor(:, :)  !! A (n,4), weighed [N/m^6]
     logical :: weighs = .false.                           !! the sums read fields times the share
@@ -286,7 +286,7 @@ contains
     real(wp), intent(in), contiguous :: p(:, :)   !! P xx xy yx yy [Pa]; row 1 is row lo
 
     call stress_times_k_inverse(lo, hi, self%k_inverse, p, self%force_tensor)
-    if (allocated(self%control)) &
+    if (allocated(self%control) .and. .not. self%sums_whole_control) &
       call subtract_affine_control(lo, hi, self%control, h, self%force_tensor)
     call self%weigh_block(lo, hi, self%force_tensor)
   end subroutine hand_over_block

@@ -1,5 +1,7 @@
 !> From checked input and a body to the model: operators, materials, supports, loads.
 module pd_setup
+  use pd_balance, only: balance_list, balance_t, look_for_balance
+  use pd_balanced_list, only: balanced_list_t
   use pd_bond_list, only: bond_list_t, new_bond_list
   use pd_errors, only: error_list_t
   use pd_families, only: horizon_t, new_horizon
@@ -7,7 +9,7 @@ module pd_setup
   use pd_kinds, only: wp
   use pd_lattice, only: lattice_operators_t, new_lattice_operators
   use pd_model, only: model_t
-  use pd_setup_loads, only: find_unbalanced, set_up_loads, set_up_platens, set_up_supports
+  use pd_setup_loads, only: set_up_loads, set_up_platens, set_up_supports
   use pd_setup_materials, only: set_up_materials, set_up_points, set_up_relaxing_control
   use pd_shape_tensor, only: invert_shape_tensors
   implicit none
@@ -38,7 +40,7 @@ contains
     call set_up_points(model)
     call invert_shape_tensors(model%operators, model%points%position, model%points%volume, errors)
     if (errors%count() > 0) return
-    call find_unbalanced(model)
+    if (.not. allocated(model%body%place)) call balance_cloud(input, model)
     call set_up_materials(input, model)
     if (input%stabilisation%method == 'relaxing') &
       call set_up_relaxing_control(input%stabilisation, horizon, model, errors)
@@ -69,6 +71,28 @@ contains
       call move_alloc(list, model%operators)
     end if
   end subroutine choose_operators
+
+  !> Weights of a cloud with which a homogeneous stress is in balance, unless plain ones are asked
+  !> for, are in balance themselves, or leave less than what could be found.
+  subroutine balance_cloud(input, model)
+    type(input_t), intent(in)    :: input
+    type(model_t), intent(inout) :: model
+    type(balanced_list_t), allocatable :: balanced
+    type(balance_t) :: balance
+
+    select type (list => model%operators)
+    class is (bond_list_t)
+      associate (points => model%points)
+        call look_for_balance(list, points%volume, model%delta, model%body%boundary == 0, balance)
+        model%unbalanced(1) = balance%before
+        if (input%discretisation%cloud_weights == 'plain' .or. .not. balance%needed()) return
+        allocate (balanced)
+        call balance_list(list, points%volume, model%delta, balance, balanced)
+        model%unbalanced(2) = balance%after
+      end associate
+    end select
+    if (balance%after < balance%before) call move_alloc(balanced, model%operators)
+  end subroutine balance_cloud
 
   !> Damping, and the frame in which it acts.
   subroutine set_up_damping(input, model)

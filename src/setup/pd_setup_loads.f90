@@ -21,7 +21,7 @@ module pd_setup_loads
   implicit none
   private
 
-  public :: find_unbalanced, set_up_supports, set_up_platens, set_up_loads
+  public :: set_up_supports, set_up_platens, set_up_loads
 
 contains
 
@@ -139,28 +139,6 @@ contains
         model%body%lower, model%body%upper)
     end associate
   end subroutine set_up_platens
-
-  !> Largest |N_i| / sqrt(V_i) inside a body whose points are on no lattice: a homogeneous stress P
-  !> leaves the force P N_i there. It is 1 at a straight surface, and 0 inside a lattice. Inside is
-  !> what is more than two horizons from the box around the points.
-  subroutine find_unbalanced(model)
-    type(model_t), intent(inout) :: model
-    real(wp), allocatable :: vectors(:, :)
-    real(wp) :: lower(2), upper(2)
-    integer  :: i, row
-
-    if (allocated(model%body%place)) return
-    allocate (vectors(model%operators%n, 2), source=0.0_wp)
-    call surface_vectors(model%operators, model%points%volume, vectors)
-    lower = minval(model%body%position, dim=1) + 2.0_wp * model%delta
-    upper = maxval(model%body%position, dim=1) - 2.0_wp * model%delta
-    do i = 1, model%body%n
-      if (any(model%body%position(i, :) < lower .or. model%body%position(i, :) > upper)) cycle
-      row = model%operators%storage%row(i)
-      model%unbalanced = max(model%unbalanced, &
-        norm2(vectors(row, :)) / sqrt(model%points%volume(row)))
-    end do
-  end subroutine find_unbalanced
 
   !> Loads, in the order in which they are added to the forces.
   !>

@@ -130,6 +130,11 @@ MISTAKES = {
         "&integration final_strain: a platen moves under a traction",
     ),
     "ramp without a load": ("-0.01 /", "-0.01, ramp_time = 1 /", "no effect without traction"),
+    "weights of a cloud on a lattice": (
+        "spacing = ",
+        "cloud_weights = 'plain', spacing = ",
+        "the key has no effect on a lattice",
+    ),
     "material that is not there": (
         "y_max = 1.0",
         "y_max = 1.0, material = 'clay'",
