@@ -49,6 +49,7 @@ module pd_run
     type(checkpoint_t) :: checkpoint          !! to continue from; no rows: a new run
     type(error_list_t) :: warnings
     logical :: doubted = .false.              !! the energy balance has been warned of
+    logical :: jump_told = .false.            !! at equilibrium
     logical :: balance_doubted = .false.      !! that of the forces, too
     logical :: control_doubted = .false.      !! the part of the control in the work, too
     logical :: step_doubted = .false.         !! the time step that the user has fixed, too

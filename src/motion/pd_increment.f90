@@ -33,6 +33,7 @@ module pd_increment
     type(relaxation_t) :: relaxation
     type(relaxed_t)    :: last         !! what came of the last one
     integer :: unfinished = 0          !! increments that were taken without being at rest
+    real(wp) :: released = 0.0_wp      !! energy that the last one has set free [J/m]
     logical :: lost = .false.          !! the last one did not come to rest, and was not taken
     logical :: under_load = .false.    !! loads grow in the last one
   end type increments_t
@@ -135,7 +136,7 @@ contains
     real(wp),           intent(in)    :: t, duration   !! [s]
     type(model_t),      intent(in)    :: model
     type(state_t),      intent(in)    :: state
-    type(increments_t), intent(in)    :: increments
+    type(increments_t), intent(inout) :: increments
     type(ledger_t),     intent(inout) :: ledger
     real(wp) :: work, held
     integer  :: k
@@ -151,6 +152,7 @@ contains
     ledger%outer_work = ledger%outer_work + model%loads%work(state%velocity, t, t + duration)
     ledger%damping = ledger%damping + increments%last%work
     ledger%damping(1) = ledger%damping(1) + held
+    increments%released = model%blocks%total(increments%last%work) + held
     ledger%plastic = ledger%plastic + increments%relaxation%blocks%dissipated
     ledger%control = ledger%control + increments%relaxation%blocks%relaxed
   end subroutine enter_work

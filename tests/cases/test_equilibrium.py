@@ -104,6 +104,19 @@ def test_the_limit_of_a_load_ends_the_run(run_case, tmp_path):
     assert run["step"][-1] != run["step"][-2]
 
 
+def test_a_jump_is_followed_and_told(run_case, tmp_path):
+    text = changed(RESTING, kinematic_modulus="-2.0e7", amplitude="1.0e-2")
+    done = run_case(text, tmp_path, "--quiet", "--threads", "1")
+    assert done.returncode == 0, done.stderr
+    log = (tmp_path / "out" / "case.log").read_text()
+    assert "a jump at step" in log
+    run = history(tmp_path / "out" / "case_history.csv")
+    assert run["unbalanced_force"][1:].max() <= 1e-4
+    fall = -np.diff(run["bottom_force_y"]).min()
+    assert fall > 0.2 * run["bottom_force_y"].max()
+    assert np.diff(run["damping_dissipation"]).max() > 0.01 * run["external_work"].max()
+
+
 def test_threads_change_no_bit(run_case, tmp_path):
     for threads in (1, 3):
         done = run_case(
