@@ -6,12 +6,13 @@ program perigeo
   use omp_lib, only: omp_set_num_threads
   use pd_check, only: answer_questions, print_check
   use pd_command_line, only: options_t, read_command_line
+  use pd_doubts, only: look_at_time_step
   use pd_errors, only: error_list_t, exit_command_line, outcome_t
   use pd_exit, only: leave
   use pd_increment, only: take_increment
   use pd_run, only: open_outputs, run_t, set_up_run
-  use pd_run_steps, only: due_after_step, due_t, end_without_equilibrium, finish_run, &
-    look_at_time_step, write_what_is_due
+  use pd_run_end, only: end_without_equilibrium, finish_run
+  use pd_run_steps, only: due_after_step, due_t, write_what_is_due
   use pd_step, only: take_step
   use pd_system, only: catch_signals
   implicit none

@@ -1,0 +1,126 @@
+!> How a run ends: complete, at the limit of its loads, or with a failure.
+module pd_run_end
+  use, intrinsic :: iso_fortran_env, only: error_unit, int64
+  use pd_errors, only: error_list_t, exit_calculation, exit_file, exit_ok, outcome_t
+  use pd_kinds, only: wp
+  use pd_record, only: close_record, observe_state, record_failure, record_frame, record_line, &
+    record_row
+  use pd_run, only: run_t
+  use pd_text, only: integer_text, short_number
+  use pd_timing, only: kernel_names
+  use pd_unbalanced, only: loads_at
+  implicit none
+  private
+
+  public :: finish_run, end_without_equilibrium, fail, fastest_row, remedy
+
+contains
+
+  !> No equilibrium was found. Under loads that is their limit: the last equilibrium is written, and
+  !> the run is finished. Without loads it is a failure.
+  subroutine end_without_equilibrium(run, outcome)
+    type(run_t),     intent(inout) :: run
+    type(outcome_t), intent(inout) :: outcome
+    type(error_list_t) :: errors
+    character(:), allocatable :: tried
+    integer :: row
+
+    associate (last => run%increments%last, t => run%clock%time())
+      tried = short_number(t + run%clock%time_step)//' s, where the unbalanced force is '// &
+        short_number(last%residual)//' of reactions and loads after '// &
+        integer_text(last%moves)//' moves'
+      if (.not. run%increments%under_load) then
+        row = last%failed_row
+        if (row == 0) row = fastest_row(run)
+        call fail('no equilibrium was found at '//tried, row, run, outcome)
+        return
+      end if
+      if (run%record%moment%step /= run%clock%step) then
+        call run%ledger%note_work(run%model%blocks)
+        call observe_state(run%model, run%state, run%ledger, run%clock, run%record)
+        call record_row(run%record, errors)
+      end if
+      call record_frame(run%model, run%state, run%record, errors)
+      call record_line(run%record, 'limit load: the last equilibrium is at '//short_number(t)// &
+        ' s, under loads of '//short_number(loads_at(run%model, t))//' N/m in all; there is '// &
+        'none at '//tried, errors)
+    end associate
+    call outcome%end_if_any(errors, exit_file)
+    if (.not. outcome%done) call finish_run(run, outcome)
+    if (.not. outcome%done) call outcome%end_with(exit_ok)
+  end subroutine end_without_equilibrium
+
+  !> The row that moves fastest among those that are free: where a run fails that gains energy.
+  pure integer function fastest_row(run)
+    type(run_t), intent(in) :: run
+
+    fastest_row = maxloc(sum((run%model%points%free * run%state%velocity)**2, dim=2), dim=1)
+  end function fastest_row
+
+  !> What mends a balance.
+  pure function remedy(run) result(text)
+    type(run_t), intent(in) :: run
+    character(:), allocatable :: text
+
+    text = 'a smaller safety or time step'
+    if (run%model%at_equilibrium) text = 'a larger number of increments'
+  end function remedy
+
+  !> The calculation has failed: write the state apart from the valid frames, and report where.
+  subroutine fail(reason, row, run, outcome)
+    character(*),    intent(in)    :: reason
+    integer,         intent(in)    :: row
+    type(run_t),     intent(inout) :: run
+    type(outcome_t), intent(inout) :: outcome
+    type(error_list_t) :: errors, file_errors
+    character(160) :: where
+
+    associate (x => run%model%points%position)
+      write (where, '(a,i0,a,es12.5,a,i0,a,g0.7,a,g0.7,a)') 'step ', run%clock%step, ', time ', &
+        run%clock%time(), ' s, point ', run%model%operators%storage%point_at(row), ' at (', &
+        x(row, 1), ', ', x(row, 2), ') m'
+    end associate
+    call record_failure(run%model, run%state, run%clock, run%record, file_errors)
+    call record_line(run%record, 'the calculation failed: '//reason//'; '//trim(where), file_errors)
+    call file_errors%print(error_unit)
+    call errors%add('the calculation failed: '//reason//'; the frames and rows before this '// &
+      'step are good; '//remedy(run)//' may help', trim(where))
+    call outcome%end_if_any(errors, exit_calculation)
+  end subroutine fail
+
+  !> End a run that is complete.
+  subroutine finish_run(run, outcome)
+    type(run_t),     intent(inout) :: run
+    type(outcome_t), intent(inout) :: outcome
+    type(error_list_t) :: errors
+
+    call tell_where_time_went(run, errors)
+    call record_line(run%record, 'results in '//run%record%stem//'.h5, .xdmf, _history.csv', errors)
+    call close_record(run%record, errors)
+    call outcome%end_if_any(errors, exit_file)
+  end subroutine finish_run
+
+  !> Last lines of the log: seconds of the time loop and of its kernels; the rest is frames and
+  !> checkpoints.
+  subroutine tell_where_time_went(run, errors)
+    type(run_t),        intent(inout) :: run
+    type(error_list_t), intent(inout) :: errors
+    integer(int64) :: now, rate
+    character(256) :: line
+    real(wp) :: whole
+    integer  :: k
+
+    call system_clock(now, rate)
+    whole = real(now - run%loop_start, wp) / real(rate, wp)
+    write (line, '(a,f10.3,a,i0)') 'time loop ', whole, ' s, steps ', &
+      run%clock%step - run%checkpoint%clock%step
+    if (run%model%at_equilibrium) line = trim(line)//', evaluations of the forces '// &
+      integer_text(run%increments%relaxation%moves + run%clock%step - run%checkpoint%clock%step)
+    call record_line(run%record, trim(line), errors)
+    write (line, '(a,9(2x,a,f9.3))') 'kernels [s] ', &
+      (trim(kernel_names(k)), run%timing%seconds(k), k=1, size(kernel_names)), 'frames', &
+      max(0.0_wp, whole - sum(run%timing%seconds))
+    call record_line(run%record, trim(line), errors)
+  end subroutine tell_where_time_went
+
+end module pd_run_end
