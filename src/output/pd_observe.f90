@@ -113,8 +113,7 @@ contains
     row%moment = moment
     call model%operators%control_energy(model%points%volume, state%displacement, &
       state%displacement_gradient, row%control_energy)
-    call model%operators%relaxing_energy(state%displacement, state%displacement_gradient, &
-      state%control_memory, held)
+    call model%operators%relaxing_energy(state%control_memory, held)
     row%control_energy = row%control_energy + held
     allocate (row%seen%names(size(columns)), source=columns%name)
     allocate (row%seen%values(size(columns)), source=ieee_value(1.0_wp, ieee_quiet_nan))
