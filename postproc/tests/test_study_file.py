@@ -119,6 +119,14 @@ def test_expressions_set_values_of_the_namelist(load: Any) -> None:
     assert "A base" not in text
 
 
+def test_a_series_may_start_from_a_base_of_its_own(load: Any, tmp_path: Path) -> None:
+    (tmp_path / "other.nml").write_text(BASE.replace("spacing = 0.1", "spacing = 0.05"))
+    study = load(HEAD + "[[series]]\nname = 'a'\n[[series]]\nname = 'b'\nbase = 'other.nml'\n")
+    first, second = (run.input_text("trial", "Trial", "x") for run in study.runs)
+    assert "\n  spacing = 0.1\n" in first
+    assert "\n  spacing = 0.05\n" in second
+
+
 def test_a_title_and_checkpoints_that_are_asked_for_are_kept(load: Any) -> None:
     changes = "[set]\n'output.checkpoint_every' = 0\n'run.title' = 'Mine'\n"
     text = load(HEAD + changes).runs[0].input_text("trial", "Trial", "x")
@@ -265,7 +273,9 @@ FINDING = '[[finding]]\ntitle = "F"\nfound = "{a}"\n'
         (HEAD + "[set]\n'body.x_min' = '=1 +'\n", "'1 +' is no expression"),
         (HEAD + "[set]\n'body.x_min' = '=1 / 0'\n", "'1 / 0': division by zero"),
         (HEAD + "[[series]]\nname = 'a'\n[[series]]\nname = 'a'\n", "line 8, series 2, name: two"),
-        (HEAD + "[[series]]\nname = 'a'\nbase = 'b'\n", "line 7, series 1, base: unknown key"),
+        (HEAD + "[[series]]\nname = 'a'\nbas = 'b'\n", "line 7, series 1, bas: unknown key"),
+        (HEAD + "[[series]]\nname = 'a'\nbase = 'b'\n",
+         "line 7, series 1, base: the base cannot be read: No such"),
         (SWEPT + "[figure]\n" + FIGURE, "line 7, figure: must be a list of tables"),
         (SWEPT + "[[figure]]\n" + FIGURE.replace("plot", "polt"),
          "line 9, figure 1, kind: unknown kind of figure, did you mean 'plot'?"),

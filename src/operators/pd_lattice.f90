@@ -321,7 +321,8 @@ contains
     do block = 1, self%domain%blocks%count
       lo = self%domain%blocks%lo(block)
       hi = self%domain%blocks%hi(block)
-      call add_radial_sums(self%residual, lo, hi, nothing, self%share_of, self%residual_weight(lo:hi))
+      call add_radial_sums(self%residual, lo, hi, nothing, self%share_of, &
+        self%residual_weight(lo:hi))
       where (self%share_of(lo:hi) > 0.0_wp)
         self%residual_weight(lo:hi) = self%residual_weight(lo:hi) / self%share_of(lo:hi)
       else where

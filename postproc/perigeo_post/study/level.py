@@ -33,6 +33,7 @@ class Level:
     label: str
     strain: Any
     line: Any
+    base: str
     place: Key
     title: str
 
@@ -58,6 +59,7 @@ class Level:
             label=self.label or top.label,
             strain=top.strain if self.strain is None else self.strain,
             line=top.line if self.line is None else self.line,
+            base=self.base or top.base,
             place=self.place,
             title=self.title,
         )
@@ -78,6 +80,7 @@ def level_of(table: LevelTable, place: Key, name: str) -> Level:
         label=table.label,
         strain=table.strain,
         line=table.line,
+        base=table.base,
         place=place,
         title=table.title or name,
     )
