@@ -145,7 +145,7 @@ distclean: clean   ## remove .venv and results too
 
 help:              ## list the targets
 	@echo 'Targets:'
-	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / { printf "  make %-13s %s\n", $$1, $$2 }' Makefile
+	@awk -F ':.*## ' '/^[a-z0-9_-]+:.*## / { printf "  make %-13s %s\n", $$1, $$2 }' Makefile
 	@echo 'Settings:'
 	@echo '  MARCH=x86-64-v3   processor to compile for (native; empty: any)'
 	@echo '  FFLAGS=-O2        optimisation flags (-O3)'

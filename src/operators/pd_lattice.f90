@@ -298,12 +298,12 @@ contains
     integer,  intent(in) :: lo, hi
     real(wp), intent(in), contiguous :: x(:, :)   !! x~ (n,2)
     real(wp), intent(inout) :: s(n_block, 2)      !! out; row 1 is row lo
-    integer :: k, n
+    integer :: k
 
-    n = hi - lo + 1
-    s(:n, :) = 0.0_wp
+    s = 0.0_wp
     do k = 1, 2
-      call add_radial_sums(self%residual, lo, hi, self%residual_weight, x(:, k), s(:n, k))
+      call add_radial_sums(self%residual, lo, hi, self%residual_weight, x(:, k), &
+        s(:hi - lo + 1, k))
     end do
   end subroutine difference_sums_block
 
@@ -315,21 +315,18 @@ contains
     integer :: block, lo, hi
 
     self%residual = new_radial_sums(residual_weights(self, falloff), self%storage%stride)
-    if (allocated(self%residual_weight)) deallocate (self%residual_weight)
-    allocate (self%residual_weight(self%n), nothing(self%n), source=0.0_wp)
+    allocate (nothing(self%n), source=0.0_wp)
+    self%residual_weight = nothing
     !$omp parallel do schedule(static) default(none) shared(self, nothing) private(block, lo, hi)
     do block = 1, self%domain%blocks%count
       lo = self%domain%blocks%lo(block)
       hi = self%domain%blocks%hi(block)
       call add_radial_sums(self%residual, lo, hi, nothing, self%share_of, &
         self%residual_weight(lo:hi))
-      where (self%share_of(lo:hi) > 0.0_wp)
-        self%residual_weight(lo:hi) = self%residual_weight(lo:hi) / self%share_of(lo:hi)
-      else where
-        self%residual_weight(lo:hi) = 0.0_wp
-      end where
     end do
     !$omp end parallel do
+    where (self%share_of <= 0.0_wp) self%residual_weight = 0.0_wp
+    where (self%share_of > 0.0_wp) self%residual_weight = self%residual_weight / self%share_of
   end subroutine weigh_residuals
 
   !> omega V_0 (1 - a |xi|^2) of columns and rows away; 0 for the point itself, which S leaves out.
@@ -345,8 +342,7 @@ contains
     allocate (weight(0:reach, 0:reach), source=0.0_wp)
     do p = 1, self%n_pairs
       place = abs(nint(self%xi(p, :) / spacing))
-      weight(place(1), place(2)) = self%weight(p) &
-        * (1.0_wp - falloff * (self%xi(p, 1)**2 + self%xi(p, 2)**2))
+      weight(place(1), place(2)) = self%weight(p) * (1.0_wp - falloff * sum(self%xi(p, :)**2))
     end do
   end function residual_weights
 

@@ -58,8 +58,8 @@ contains
     sums%shift(:last) = [(r * stride, r=1, last)]
   end function new_radial_sums
 
-  !> total <- total + E[f] - own f for rows lo to hi. Fields reach m rows of the lattice beyond these,
-  !> and a margin of whole cache lines.
+  !> total <- total + E[f] - own f for rows lo to hi. Fields reach m rows of the lattice beyond
+  !> these, and a margin of whole cache lines.
   pure subroutine add_radial_sums(sums, lo, hi, own, f, total)
     type(radial_sums_t), intent(in) :: sums
     integer,  intent(in) :: lo, hi
@@ -151,8 +151,8 @@ contains
     end do
   end subroutine more_rows
 
-  !> total <- total - own f + columns 0 to `wide` - 1 + the outermost points. Columns beyond the margin
-  !> have no weight; they are read within it.
+  !> total <- total - own f + columns 0 to `wide` - 1 + the outermost points. Columns beyond the
+  !> margin have no weight; they are read within it.
   pure subroutine add_middle(sums, lo, n, own, f, strands, total)
     type(radial_sums_t), intent(in) :: sums
     integer,  intent(in) :: lo, n

@@ -96,7 +96,8 @@ class PushLoad:
 
 def push_load(run: Run) -> PushLoad:
     """The normal force of the boundary on a part of a side (`span`), while it is pushed evenly."""
-    pushed = [name for name in run.boundary_names if f"boundary({name}).span" in run.values]
+    spans = {name: run.value(f"boundary({name}).span") for name in run.boundary_names}
+    pushed = [name for name, span in spans.items() if span not in (None, "none")]
     if len(pushed) != 1:
         raise RequestError(f"{run.path} has no single boundary on a part of a side")
     name = pushed[0]

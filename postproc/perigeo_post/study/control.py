@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from ..measure.noise import noise_of, push_load
 from ..read.run import Run
 from .measuring import Values, frame_of, measure_of, value_or
@@ -22,6 +24,7 @@ _SHARE = {
 _LOAD = {
     "load_mean": Column("N/m", "load of the boundary with a span, from 0.4 of its motion on"),
     "load_end": Column("N/m", "the same at the end"),
+    "load_energy_error": Column("1", "largest error of the energy balance of this run"),
 }
 
 
@@ -46,7 +49,8 @@ def _share(run: Run, state: State) -> Values:
 
 def _load(run: Run, state: State) -> Values:
     found = push_load(run)
-    return {"load_mean": found.mean, "load_end": found.end}
+    error = float(np.nanmax(np.abs(run.history()["energy_error"])))
+    return {"load_mean": found.mean, "load_end": found.end, "load_energy_error": error}
 
 
 CONTROL = measure_of({_noise: _NOISE, _share: _SHARE})

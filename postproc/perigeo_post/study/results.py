@@ -44,6 +44,8 @@ MEASURING = (
     "read/*.py",
     "measure/*.py",
     "study/measures.py",
+    "study/measuring.py",
+    "study/control.py",
     "study/expressions.py",
     "study/findings.py",
 )
