@@ -37,7 +37,7 @@ contains
     class(key_visitor_t),         intent(inout) :: visitor
 
     call visitor%group(group_key_t('stabilisation', meaning='control of zero-energy modes'))
-    call visitor%text_key(key_t('method', default='none', choices='none silling relaxing', &
+    call visitor%text_key(key_t('method', default='relaxing', choices='none silling relaxing', &
       meaning='none; silling: the control of Silling (2017); relaxing: a control that lets go ' &
       //'where the material flows'), self%method)
     call visitor%real_key(key_t('factor', unit='1', default='0.0', range=not_negative, &
