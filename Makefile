@@ -49,7 +49,8 @@ build    := build/$(BUILD)
 # ---------------------------------------------------------------------------------- targets
 .SUFFIXES:
 .DELETE_ON_ERROR:
-studies := fig3a fig3b fig4 fig5 seeds horizon loading size softening influence heterogeneity
+studies := fig3a fig3b fig4 fig5 seeds horizon loading size softening influence heterogeneity \
+  zero_energy
 .PHONY: all program objects post debug units demo demo-quick test lint verify \
   layers setup install help clean distclean figures $(studies) \
   report report-view site bench clouds
@@ -89,6 +90,7 @@ size:              ## study: size and shape of the specimen
 softening:         ## study: kinds of softening, its modulus, the residual strength
 influence:         ## study: influence functions
 heterogeneity:     ## study: soil whose strength varies from place to place
+zero_energy:       ## study: controls of zero-energy modes: noise, bands, limit load
 figures: asked = $(studies)
 figures $(studies):
 	@sh tools/setup.sh run
@@ -149,7 +151,7 @@ distclean: clean   ## remove .venv and results too
 
 help:              ## list the targets
 	@echo 'Targets:'
-	@awk -F ':.*## ' '/^[a-z0-9-]+:.*## / { printf "  make %-13s %s\n", $$1, $$2 }' Makefile
+	@awk -F ':.*## ' '/^[a-z0-9_-]+:.*## / { printf "  make %-13s %s\n", $$1, $$2 }' Makefile
 	@echo 'Settings:'
 	@echo '  MARCH=x86-64-v3   processor to compile for (native; empty: any)'
 	@echo '  FFLAGS=-O2        optimisation flags (-O3)'

@@ -12,8 +12,7 @@ from perigeo_post.draw.style import new_figure
 from perigeo_post.study.file import Kinds, Study, load_study
 from perigeo_post.study.inputs import Inputs
 from perigeo_post.study.program import Program, find_program
-from perigeo_post.study.tables import OPTIONS
-from perigeo_post.study.toml import StudyError, key_lines
+from perigeo_post.study.toml import StudyError
 from perigeo_post.study.types import Column, Drawing, Measure
 
 BASE = """\
@@ -117,6 +116,14 @@ def test_expressions_set_values_of_the_namelist(load: Any) -> None:
     assert "&pressure\n  name = 'left'\n  side = 'left'\n  value = 100000.0\n" in text
     assert "history_count = 70" not in text
     assert "A base" not in text
+
+
+def test_a_series_may_start_from_a_base_of_its_own(load: Any, tmp_path: Path) -> None:
+    (tmp_path / "other.nml").write_text(BASE.replace("spacing = 0.1", "spacing = 0.05"))
+    study = load(HEAD + "[[series]]\nname = 'a'\n[[series]]\nname = 'b'\nbase = 'other.nml'\n")
+    first, second = (run.input_text("trial", "Trial", "x") for run in study.runs)
+    assert "\n  spacing = 0.1\n" in first
+    assert "\n  spacing = 0.05\n" in second
 
 
 def test_a_title_and_checkpoints_that_are_asked_for_are_kept(load: Any) -> None:
@@ -275,7 +282,9 @@ FINDING = '[[finding]]\ntitle = "F"\nfound = "{a}"\n'
         (HEAD + "[set]\n'body.x_min' = '=1 +'\n", "'1 +' is no expression"),
         (HEAD + "[set]\n'body.x_min' = '=1 / 0'\n", "'1 / 0': division by zero"),
         (HEAD + "[[series]]\nname = 'a'\n[[series]]\nname = 'a'\n", "line 8, series 2, name: two"),
-        (HEAD + "[[series]]\nname = 'a'\nbase = 'b'\n", "line 7, series 1, base: unknown key"),
+        (HEAD + "[[series]]\nname = 'a'\nbas = 'b'\n", "line 7, series 1, bas: unknown key"),
+        (HEAD + "[[series]]\nname = 'a'\nbase = 'b'\n",
+         "line 7, series 1, base: the base cannot be read: No such"),
         (SWEPT + "[figure]\n" + FIGURE, "line 7, figure: must be a list of tables"),
         (SWEPT + "[[figure]]\n" + FIGURE.replace("plot", "polt"),
          "line 9, figure 1, kind: unknown kind of figure, did you mean 'plot'?"),
@@ -421,30 +430,3 @@ def test_measures_may_not_take_the_name_of_a_parameter(load: Any) -> None:
     measures = {"band": Measure({"m": Column("1", "?")}, lambda run, state: {})}
     with pytest.raises(StudyError, match="'band' gives a column 'm', which is there"):
         load(SWEPT, None, dataclasses.replace(KINDS, measures=measures))
-
-
-def test_lines_of_keys_are_found_in_tables_and_lists_of_tables() -> None:
-    text = """\
-a = 1
-[b]
-"c.d" = 2
-[[e]]
-f = 3
-[e.g]
-h = 4
-[[e]]
-f = 5
-[[e.i]]
-j.k = 6
-"""
-    assert key_lines(text) == {
-        ("a",): 1, ("b",): 2, ("b", "c.d"): 3, ("e", 0): 4, ("e", 0, "f"): 5, ("e", 0, "g"): 6,
-        ("e", 0, "g", "h"): 7, ("e", 1): 8, ("e", 1, "f"): 9, ("e", 1, "i", 0): 10,
-        ("e", 1, "i", 0, "j", "k"): 11,
-    }  # fmt: skip
-
-
-def test_every_option_of_a_figure_has_a_form() -> None:
-    from perigeo_post.study.figures import FIGURE_OPTIONS
-
-    assert set().union(*FIGURE_OPTIONS.values()) == set(OPTIONS)

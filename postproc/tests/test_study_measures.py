@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from perigeo_post import Run
+from perigeo_post.measure.noise import alternating
 from perigeo_post.study.measures import MEASURES, line_meeting
 from perigeo_post.study.types import Missing, State, Value
 
@@ -109,6 +110,38 @@ def test_the_quality_of_a_run(result: Path) -> None:
     assert found["reaction_gap_largest"] == pytest.approx(0.01 / 1.01, rel=1e-6)
     assert found["energy_error_largest"] == pytest.approx(1e-5)
     assert found["zero_energy_largest"] == pytest.approx(1e-3)
+
+
+def test_noise_is_the_amplitude_of_what_alternates_and_tells_flow_from_the_rest() -> None:
+    x, y = np.meshgrid(np.arange(20.0), np.arange(30.0))
+    u = np.stack([0.3 * (-1.0) ** x + x**3, 2.0 * x - y], axis=2)
+    along_y, along_x = alternating(u)
+    inner = along_x[:, 2:-2]
+    assert np.abs(inner[..., 0]) == pytest.approx(0.3)  # the cubic part is not seen
+    assert along_y[2:-2] == pytest.approx(0.0, abs=1e-9)
+    assert np.isnan(along_x[:, :2]).all()
+    assert np.isnan(along_y[-2:]).all()
+
+
+def test_noise_outside_and_inside_of_the_flow(result: Path) -> None:
+    run = Run(result)
+    alpha = np.where(run.positions[:, 1] > 1.2, 0.01, 0.0)
+    layer = np.rint(run.positions[:, 0] / 0.04)
+    # the horizon reaches 0.12 m from the flow: noise there belongs to neither
+    amplitude = np.where(run.positions[:, 1] > 1.09, 0.004, 0.0004)
+    with h5py.File(result, "r+") as file:
+        frame = file[f"frames/{sorted(file['frames'])[-1]}"]
+        frame["plastic_strain"][...] = alpha
+        frame["displacement"][:, 0] = amplitude * (-1.0) ** layer
+        frame["displacement"][:, 1] = 0.0
+        frame["zero_energy"][...] = np.where(alpha > 0.0, 0.1, 0.001)
+    found = take(result, "control", State())
+    # of four parts, two directions and two components, one alternates: x along x; edges lack it
+    assert found["zero_energy_inside"] == pytest.approx(0.1)
+    assert found["zero_energy_outside"] == pytest.approx(0.001)
+    assert found["noise_inside"] == pytest.approx(0.5 * 0.1, rel=0.15)
+    assert found["noise_outside"] == pytest.approx(0.5 * 0.01, rel=0.15)
+    assert reasons(result, "load")["load_end"].endswith("on a part of a side")
 
 
 def test_the_softening_branch_and_what_it_dissipates(result: Path) -> None:

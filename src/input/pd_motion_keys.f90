@@ -14,8 +14,8 @@ module pd_motion_keys
   type :: stabilisation_input_t
     character(:), allocatable :: method
     real(wp) :: factor = 0.0_wp
-    real(wp) :: relaxing_stiffness = 1.0_wp            !! kappa
-    real(wp) :: relaxing_strain = 1.0e-3_wp            !! beta
+    real(wp) :: relaxing_stiffness = 0.5_wp            !! kappa
+    real(wp) :: relaxing_strain = 1.0e-4_wp            !! beta
   contains
     procedure :: visit => visit_stabilisation
   end type stabilisation_input_t
@@ -43,15 +43,15 @@ contains
     class(key_visitor_t),         intent(inout) :: visitor
 
     call visitor%group(group_key_t('stabilisation', meaning='control of zero-energy modes'))
-    call visitor%text_key(key_t('method', default='none', choices='none silling relaxing', &
+    call visitor%text_key(key_t('method', default='relaxing', choices='none silling relaxing', &
       meaning='none; silling: the control of Silling (2017); relaxing: a control that lets go ' &
       //'where the material flows'), self%method)
     call visitor%real_key(key_t('factor', unit='1', default='0.0', range=not_negative, &
       also='above 0 for silling, else 0', meaning='strength of the control, g'), self%factor)
-    call visitor%real_key(key_t('relaxing_stiffness', unit='1', default='1.0', range=positive, &
+    call visitor%real_key(key_t('relaxing_stiffness', unit='1', default='0.5', range=positive, &
       needs_effect=.true., also='only for relaxing', &
       meaning='stiffness of the control over E / horizon^2, kappa'), self%relaxing_stiffness)
-    call visitor%real_key(key_t('relaxing_strain', unit='1', default='1.0e-3', range=positive, &
+    call visitor%real_key(key_t('relaxing_strain', unit='1', default='1.0e-4', range=positive, &
       needs_effect=.true., also='only for relaxing', &
       meaning='how slowly the control lets go, beta: plastic strain in strains ' &
       //'strength / (kappa E) at which half is left'), self%relaxing_strain)

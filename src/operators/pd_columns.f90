@@ -9,12 +9,7 @@
 !>   Q_k(i) = sum_{|r| <= R_k} w_kr y_r f_{i+r}      Y_i = Q_0(i) + sum_{k>0} (Q_k(i+k) + Q_k(i-k))
 !>                                                   L_i = P_0(i) + sum_{k>0} (P_k(i+k) + P_k(i-k))
 !>
-!> Weights that fall off with the square of the distance are a sum of two of the kind of L, one with
-!> other weights across, one with other weights up and down (`falling_off`):
-!>
-!>   sum_j w (1 - a |xi|^2) f_j = sum_k (1 - a x_k^2) P_k - a sum_k sum_r w_kr y_r^2 f_{i+r}
-!>
-!> Only these and L include the point itself, as a bond of length zero.
+!> L includes the point itself, as a bond of length zero.
 !> Where the weights are products, w_kr = g_k g_r (Gaussian and constant influence), columns differ
 !> only in height, and a high one continues where a lower one ends: the work grows with m, not
 !> with its square. Other weights have sums of their own for every column, about as much work as
@@ -24,7 +19,7 @@ module pd_columns
   implicit none
   private
 
-  public :: columns_t, sums_t, new_columns, falling_off, add_sums
+  public :: columns_t, sums_t, new_columns, add_sums
 
   integer, parameter :: most = 4   !! columns per pass: their sums stay in registers
   !> Strands with at most so many numbers are kept on the stack, up to about m = 30; longer ones are
@@ -96,25 +91,6 @@ contains
     call list_columns(merge(strand, 0, height > 0), across, columns, columns%y)
     call list_columns(strand, across, columns, columns%l)
   end function new_columns
-
-  !> The two sums that make sum_j w (1 - a |xi|^2) f_j.
-  pure function falling_off(columns, a, spacing) result(sums)
-    type(columns_t), intent(in) :: columns
-    real(wp),        intent(in) :: a         !! [1/m^2]
-    real(wp),        intent(in) :: spacing   !! dx [m]
-    type(sums_t) :: sums(2)
-    integer :: s
-
-    sums = columns%l
-    ! `plus` and `minus` of column k are 2 k apart
-    sums(1)%weight = columns%l%weight * (1.0_wp - a * (0.5_wp * spacing &
-      * real(columns%l%plus - columns%l%minus, wp))**2)
-    sums(2)%rows(0, :) = 0.0_wp
-    do s = 1, columns%n_strands
-      sums(2)%rows(1:2, s) = -a * columns%l%rows(1:2, s) &
-        * (spacing * real(columns%rows(:, s), wp))**2
-    end do
-  end function falling_off
 
   !> Whether w_kr = g_k g_r within the horizon.
   pure logical function is_product(weight)

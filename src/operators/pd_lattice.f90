@@ -2,7 +2,7 @@
 !>
 !> The rows of the fields are the places of a box, voids among them, line by line, so that the bond
 !> to the place kx columns and ky lines away is a shift by kx + ky * stride. All sums go by columns
-!> (`pd_columns`):
+!> (`pd_columns`, S in `pd_radial_sums`):
 !>
 !>   G[u]_i = sum_j omega V_0 u~_j (x) xi - u_i (x) s_i
 !>   D[A]_i = sum_j omega V_0 A~_j xi + A_i s_i
@@ -15,12 +15,13 @@
 !> Source: doc/theory.md, sections 2, 4 and 5.
 module pd_lattice
   use pd_blocks, only: blocks_t
-  use pd_columns, only: add_sums, columns_t, falling_off, sums_t
+  use pd_columns, only: add_sums, columns_t
   use pd_domain, only: new_domain
   use pd_families, only: horizon_t, influence
   use pd_kinds, only: i8, n_block, wp
   use pd_offsets, only: columns_of, half_of_offsets
   use pd_operators, only: operators_t
+  use pd_radial_sums, only: add_radial_sums, new_radial_sums, radial_sums_t
   use pd_storage, only: lattice_storage, line_start
   implicit none
   private
@@ -40,8 +41,7 @@ module pd_lattice
     real(wp), allocatable, private :: moment(:, :)        !! s (n,2) [m^3]
     real(wp), allocatable, private :: weighed_moment(:, :)   !! s over the share (n,2) [m^3]
     real(wp), allocatable, private :: stiffness(:)        !! sum_j omega V_j (c_i + c_j) (n) [N/m^4]
-    real(wp), private :: spacing = 0.0_wp                 !! dx [m]
-    type(sums_t), private :: residual(2)                  !! that make S together
+    type(radial_sums_t), private :: residual                !! S without the part of x_i
     real(wp), allocatable, private :: residual_weight(:)  !! of x~_i in S (n) [m^2]
   contains
     procedure :: set_control
@@ -68,7 +68,6 @@ contains
     type(lattice_operators_t), intent(out) :: operators
     integer :: reach, i
 
-    operators%spacing = spacing
     operators%storage = lattice_storage(horizon, spacing, place)
     operators%n = operators%storage%rows
     reach = int(horizon%delta / spacing * (1.0_wp + 1.0e-5_wp)) + 1
@@ -293,23 +292,18 @@ contains
     end do
   end subroutine control_of_shares
 
-  !> S[x] of rows lo to hi from x~: s = sum_j w~_ij (x_j - x_i). Each sum contains the point itself;
-  !> these terms cancel.
+  !> S[x] of rows lo to hi from x~: s = sum_j w~_ij (x_j - x_i).
   pure subroutine difference_sums_block(self, lo, hi, x, s)
     class(lattice_operators_t), intent(in) :: self
     integer,  intent(in) :: lo, hi
     real(wp), intent(in), contiguous :: x(:, :)   !! x~ (n,2)
     real(wp), intent(inout) :: s(n_block, 2)      !! out; row 1 is row lo
-    integer :: i, k, n
+    integer :: k
 
-    n = hi - lo + 1
+    s = 0.0_wp
     do k = 1, 2
-      !$omp simd simdlen(8)
-      do i = lo, hi
-        s(i - lo + 1, k) = -self%residual_weight(i) * x(i, k)
-      end do
-      call add_sums(self%columns, self%residual(1), lo, hi, x(:, k), s(:n, k))
-      call add_sums(self%columns, self%residual(2), lo, hi, x(:, k), s(:n, k))
+      call add_radial_sums(self%residual, lo, hi, self%residual_weight, x(:, k), &
+        s(:hi - lo + 1, k))
     end do
   end subroutine difference_sums_block
 
@@ -317,27 +311,40 @@ contains
   subroutine weigh_residuals(self, falloff)
     class(lattice_operators_t), intent(inout) :: self
     real(wp), intent(in) :: falloff   !! a [1/m^2]
-    integer :: block, lo, hi, k
+    real(wp), allocatable :: nothing(:)
+    integer :: block, lo, hi
 
-    self%residual = falling_off(self%columns, falloff, self%spacing)
-    if (allocated(self%residual_weight)) deallocate (self%residual_weight)
-    allocate (self%residual_weight(self%n), source=0.0_wp)
-    !$omp parallel do schedule(static) default(none) shared(self) private(block, lo, hi, k)
+    self%residual = new_radial_sums(residual_weights(self, falloff), self%storage%stride)
+    allocate (nothing(self%n), source=0.0_wp)
+    self%residual_weight = nothing
+    !$omp parallel do schedule(static) default(none) shared(self, nothing) private(block, lo, hi)
     do block = 1, self%domain%blocks%count
       lo = self%domain%blocks%lo(block)
       hi = self%domain%blocks%hi(block)
-      do k = 1, 2
-        call add_sums(self%columns, self%residual(k), lo, hi, self%share_of, &
-          self%residual_weight(lo:hi))
-      end do
-      where (self%share_of(lo:hi) > 0.0_wp)
-        self%residual_weight(lo:hi) = self%residual_weight(lo:hi) / self%share_of(lo:hi)
-      else where
-        self%residual_weight(lo:hi) = 0.0_wp
-      end where
+      call add_radial_sums(self%residual, lo, hi, nothing, self%share_of, &
+        self%residual_weight(lo:hi))
     end do
     !$omp end parallel do
+    where (self%share_of <= 0.0_wp) self%residual_weight = 0.0_wp
+    where (self%share_of > 0.0_wp) self%residual_weight = self%residual_weight / self%share_of
   end subroutine weigh_residuals
+
+  !> omega V_0 (1 - a |xi|^2) of columns and rows away; 0 for the point itself, which S leaves out.
+  pure function residual_weights(self, falloff) result(weight)
+    type(lattice_operators_t), intent(in) :: self
+    real(wp), intent(in) :: falloff        !! a [1/m^2]
+    real(wp), allocatable :: weight(:, :)  !! (0:reach,0:reach)
+    integer  :: reach, p, place(2)
+    real(wp) :: spacing
+
+    spacing = minval(self%xi(:, 2), mask=self%xi(:, 2) > 0.0_wp)
+    reach = nint(maxval(self%xi) / spacing)
+    allocate (weight(0:reach, 0:reach), source=0.0_wp)
+    do p = 1, self%n_pairs
+      place = abs(nint(self%xi(p, :) / spacing))
+      weight(place(1), place(2)) = self%weight(p) * (1.0_wp - falloff * sum(self%xi(p, :)**2))
+    end do
+  end function residual_weights
 
   !> K = sum_j omega V_j xi (x) xi.
   subroutine shape_tensor(self, k)

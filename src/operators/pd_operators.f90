@@ -64,7 +64,7 @@ module pd_operators
     procedure :: control_energy
     procedure :: set_relaxing
     procedure :: relaxing_energy
-    procedure, private :: look_at_block
+    procedure, private :: residual_sums
     procedure, private :: weigh_in
     procedure, private :: weigh_block
     procedure(gradient_of), deferred :: gradient_sums_block
@@ -235,9 +235,10 @@ contains
     if (.not. allocated(self%relaxing)) return
     lo = self%domain%blocks%lo(block)
     hi = self%domain%blocks%hi(block)
-    call self%look_at_block(block, u, h, rows)
-    call self%relaxing%relax_rows(lo, hi, flow, rows, memory, dissipated)
-    call self%relaxing%join_rows(lo, hi, rows, p)
+    call self%residual_sums(lo, hi, u, rows%sums)
+    call self%relaxing%let_go(lo, hi, flow, memory, rows)
+    call self%relaxing%join_rows(lo, hi, h, rows, memory, p)
+    call self%relaxing%remember(rows, memory, dissipated)
     call self%weigh_block(lo, hi, self%relaxing%pull)
   end subroutine relax_block
 
@@ -254,29 +255,24 @@ contains
     if (.not. allocated(self%relaxing)) return
     lo = self%domain%blocks%lo(block)
     hi = self%domain%blocks%hi(block)
-    call self%look_at_block(block, u, h, rows)
-    call self%relaxing%hold_rows(lo, hi, rows)
-    call self%relaxing%join_rows(lo, hi, rows, p)
+    call self%residual_sums(lo, hi, u, rows%sums)
+    call self%relaxing%hold_rows(lo, hi, h, rows, p)
     call self%weigh_block(lo, hi, self%relaxing%pull)
   end subroutine hold_block
 
-  !> Residuals and frames of a block.
-  pure subroutine look_at_block(self, block, u, h, rows)
+  !> S[u] of rows lo to hi.
+  pure subroutine residual_sums(self, lo, hi, u, s)
     class(operators_t), intent(in) :: self
-    integer,  intent(in) :: block
-    real(wp), intent(in), contiguous :: u(:, :), h(:, :)
-    type(springs_t), intent(inout) :: rows
-    integer :: lo, hi
+    integer,  intent(in) :: lo, hi
+    real(wp), intent(in), contiguous :: u(:, :)   !! (n,2) [m]; as taken in
+    real(wp), intent(inout) :: s(n_block, 2)      !! out [m^3]; row 1 is row lo
 
-    lo = self%domain%blocks%lo(block)
-    hi = self%domain%blocks%hi(block)
     if (self%weighs) then
-      call self%difference_sums_block(lo, hi, self%weighed, rows%h)
+      call self%difference_sums_block(lo, hi, self%weighed, s)
     else
-      call self%difference_sums_block(lo, hi, u, rows%h)
+      call self%difference_sums_block(lo, hi, u, s)
     end if
-    call self%relaxing%look_at_rows(lo, hi, h, rows)
-  end subroutine look_at_block
+  end subroutine residual_sums
 
   !> Take the first Piola stress of rows lo to hi, and keep A = P K^-1 - c H.
   pure subroutine hand_over_block(self, lo, hi, h, p)
@@ -356,14 +352,11 @@ contains
   end subroutine set_relaxing
 
   !> Energy stored in the relaxing control [J/m]; 0 without.
-  subroutine relaxing_energy(self, u, h, memory, energy)
+  subroutine relaxing_energy(self, memory, energy)
     class(operators_t), intent(in) :: self
-    real(wp), intent(in), contiguous :: u(:, :)         !! (n,2) [m]; as taken in
-    real(wp), intent(in), contiguous :: h(:, :)         !! H (n,4) xx xy yx yy
     real(wp), intent(in), contiguous :: memory(:, :)   !! (n,4) [m]
     real(wp), intent(out) :: energy
-    type(springs_t) :: rows
-    type(blocks_t)  :: blocks
+    type(blocks_t) :: blocks
     real(wp), allocatable :: parts(:)
     integer :: block
 
@@ -371,11 +364,10 @@ contains
     if (.not. allocated(self%relaxing)) return
     blocks = self%domain%blocks
     allocate (parts(blocks%count))
-    !$omp parallel do schedule(static) default(none) private(block, rows) &
-    !$omp shared(self, blocks, u, h, memory, parts)
+    !$omp parallel do schedule(static) default(none) private(block) &
+    !$omp shared(self, blocks, memory, parts)
     do block = 1, blocks%count
-      call self%look_at_block(block, u, h, rows)
-      parts(block) = self%relaxing%stored(blocks%lo(block), blocks%hi(block), rows, memory)
+      parts(block) = self%relaxing%stored(blocks%lo(block), blocks%hi(block), memory)
     end do
     !$omp end parallel do
     energy = blocks%total(parts)

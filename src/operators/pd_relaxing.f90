@@ -32,32 +32,34 @@ module pd_relaxing
   !> What the control needs at the rows; rows without a point: 0.
   type :: relaxing_t
     real(wp) :: falloff = 0.0_wp                 !! M_2 / M_4 [1/m^2]
+    real(wp) :: inverse_weight = 0.0_wp          !! 1 / W~ [1/m^2]
     real(wp) :: turns = 1.0_wp                   !! 1: h is seen in the point's frame; 0: at rest
     real(wp), allocatable :: volume(:)           !! V (n) [m^2]
     real(wp), allocatable :: stiffness(:)        !! c (n) [Pa/m^2]
     real(wp), allocatable :: clock(:)            !! kappa E / beta (n) [Pa]
-    real(wp), allocatable :: inverse_weight(:)   !! 1 / W~ (n) [1/m^2]
     real(wp), allocatable :: moment(:, :)        !! s~ (n,2) [m^3]
     real(wp), allocatable :: pull(:, :)          !! g, weighed (n,2) [Pa/m^3]
-    !> Part of the springs that is kept as it follows the flow, on the way to equilibrium (n); not
-    !> allocated: it is that of the flow.
+    !> What is kept as it follows the flow, on the way to equilibrium (n); not allocated: at once.
     real(wp), allocatable, private :: following(:)
     real(wp), private :: rate = 1.0_wp           !! how fast it follows
   contains
-    procedure :: look_at_rows
-    procedure :: relax_rows
-    procedure :: hold_rows
+    procedure :: let_go
     procedure :: join_rows
+    procedure :: remember
+    procedure :: hold_rows
     procedure :: stored
     procedure :: follow
+    procedure, private :: lag
   end type relaxing_t
 
-  !> The springs of one block; row 1 is the first row of the block.
+  !> What happens to the springs of one block; row 1 is the first row of the block.
   type :: springs_t
-    real(wp) :: h(n_block, 2)             !! residual [m]
-    real(wp) :: q(n_block, 2)             !! its force [Pa/m]
-    real(wp) :: cosine(n_block), sine(n_block)   !! of the angle of R
-    real(wp) :: inverse_length(n_block)   !! of (F_11 + F_22, F_21 - F_12)
+    real(wp) :: sums(n_block, 2)   !! sum_j w~ (u_j - u_i) [m^3]
+    real(wp) :: stiffness(n_block) !! c, times what is kept of the force in this step [Pa/m^2]
+    integer  :: n = 0              !! rows that let go
+    integer  :: row(n_block)       !! (n) ascending
+    real(wp) :: kept(n_block)      !! part of the force that they keep (n)
+    real(wp) :: before(n_block, 2) !! their Q_n / c (n) [m]
   end type springs_t
 
 contains
@@ -104,92 +106,63 @@ contains
     allocate (relaxing%volume(n), source=volume)
     allocate (relaxing%stiffness(n), source=kappa * youngs_modulus / delta**2)
     allocate (relaxing%clock(n), source=kappa * youngs_modulus / beta)
-    allocate (relaxing%inverse_weight(n), source=1.0_wp / family%weight)
-    where (volume <= 0.0_wp)
-      relaxing%stiffness = 0.0_wp
-      relaxing%inverse_weight = 0.0_wp
-    end where
+    relaxing%inverse_weight = 1.0_wp / family%weight
+    where (volume <= 0.0_wp) relaxing%stiffness = 0.0_wp
     allocate (relaxing%moment(n, 2), relaxing%pull(n, 2), source=0.0_wp)
   end function new_relaxing
 
-  !> h and the frame of rows lo to hi.
-  pure subroutine look_at_rows(self, lo, hi, gradient, rows)
-    class(relaxing_t), intent(in) :: self
-    integer,  intent(in) :: lo, hi
-    real(wp), intent(in), contiguous :: gradient(:, :)   !! H (n,4) xx xy yx yy
-    type(springs_t), intent(inout) :: rows               !! in: h holds sum_j w~ (u_j - u_i) [m^3]
-    real(wp) :: a, d
-    integer  :: i, b
-
-    associate (s => self%moment, inverse => self%inverse_weight, turns => self%turns)
-      !$omp simd simdlen(8) private(b, a, d)
-      do i = lo, hi
-        b = i - lo + 1
-        rows%h(b, 1) = inverse(i) &
-          * (rows%h(b, 1) - gradient(i, 1) * s(i, 1) - gradient(i, 2) * s(i, 2))
-        rows%h(b, 2) = inverse(i) &
-          * (rows%h(b, 2) - gradient(i, 3) * s(i, 1) - gradient(i, 4) * s(i, 2))
-        ! tan theta = (F_21 - F_12) / (F_11 + F_22); their squares add up to |F|^2 + 2 det F
-        a = 2.0_wp + turns * (gradient(i, 1) + gradient(i, 4))
-        d = turns * (gradient(i, 3) - gradient(i, 2))
-        rows%inverse_length(b) = 1.0_wp / sqrt(a**2 + d**2)
-        rows%cosine(b) = a * rows%inverse_length(b)
-        rows%sine(b) = d * rows%inverse_length(b)
-      end do
-    end associate
-  end subroutine look_at_rows
-
-  !> q of rows lo to hi, whose p goes from step n to n+1 as they flow:
-  !>
-  !>   Q = c (R^T h - p_n) / (1 + kappa E d alpha / (beta sigma)),   p_{n+1} = R^T h - Q / c
-  !>
-  !> The work of the force in a step is that of the mean of Q_n and Q_{n+1}, and so is its part that
-  !> is dissipated: Q / c is remembered beside p.
-  pure subroutine relax_rows(self, lo, hi, flow, rows, memory, dissipated)
+  !> What rows lo to hi keep of their force as they flow: 1 / (1 + kappa E d alpha / (beta sigma)).
+  pure subroutine let_go(self, lo, hi, flow, memory, rows)
     class(relaxing_t), intent(inout) :: self
     integer,         intent(in)    :: lo, hi
     type(flow_t),    intent(in)    :: flow               !! of these rows
-    type(springs_t), intent(inout) :: rows               !! gets q
-    real(wp), intent(inout), contiguous :: memory(:, :)  !! p, Q / c (n,4) [m]
-    real(wp), intent(out) :: dissipated                  !! (Q_n + Q_{n+1}) . dp / 2 [J/m]
-    real(wp) :: kept(n_block), work(n_block), e1, e2, p1, p2
-    integer  :: i, b, k
+    real(wp), intent(in), contiguous :: memory(:, :)     !! p, Q / c (n,4) [m]
+    type(springs_t), intent(inout) :: rows
+    integer :: i, k, b
+
+    rows%stiffness(:hi - lo + 1) = self%stiffness(lo:hi)
+    rows%n = flow%n
+    do k = 1, flow%n
+      i = flow%rows(k)
+      rows%row(k) = i
+      ! a point without strength keeps nothing
+      rows%kept(k) = flow%strength(k) &
+        / max(tiny(1.0_wp), flow%strength(k) + self%clock(i) * flow%increment(k))
+    end do
+    if (allocated(self%following)) call self%lag(lo, hi, rows)
+    do k = 1, rows%n
+      i = rows%row(k)
+      b = i - lo + 1
+      rows%before(k, 1) = memory(i, 3)
+      rows%before(k, 2) = memory(i, 4)
+      rows%stiffness(b) = rows%kept(k) * rows%stiffness(b)
+    end do
+  end subroutine let_go
+
+  !> What is kept follows that of the flow: rows that have flowed on the way let go as well.
+  pure subroutine lag(self, lo, hi, rows)
+    class(relaxing_t), intent(inout) :: self
+    integer,         intent(in)    :: lo, hi
+    type(springs_t), intent(inout) :: rows
+    real(wp) :: kept(n_block)
+    integer  :: i, k
 
     kept = 1.0_wp
-    work = 0.0_wp
-    do k = 1, flow%n
-      ! a point without strength keeps nothing
-      kept(flow%rows(k) - lo + 1) = flow%strength(k) / max(tiny(1.0_wp), &
-        flow%strength(k) + self%clock(flow%rows(k)) * flow%increment(k))
+    do k = 1, rows%n
+      kept(rows%row(k) - lo + 1) = rows%kept(k)
     end do
-    if (allocated(self%following)) then
-      self%following(lo:hi) = self%following(lo:hi) &
-        + self%rate * (kept(:hi - lo + 1) - self%following(lo:hi))
-      kept(:hi - lo + 1) = self%following(lo:hi)
-    end if
-    !$omp simd simdlen(8) private(b, e1, e2, p1, p2)
+    rows%n = 0
     do i = lo, hi
-      b = i - lo + 1
-      e1 = rows%cosine(b) * rows%h(b, 1) + rows%sine(b) * rows%h(b, 2) - memory(i, 1)
-      e2 = rows%cosine(b) * rows%h(b, 2) - rows%sine(b) * rows%h(b, 1) - memory(i, 2)
-      p1 = (1.0_wp - kept(b)) * e1
-      p2 = (1.0_wp - kept(b)) * e2
-      e1 = kept(b) * e1
-      e2 = kept(b) * e2
-      work(b) = 0.5_wp * self%volume(i) * self%stiffness(i) &
-        * ((memory(i, 3) + e1) * p1 + (memory(i, 4) + e2) * p2)
-      memory(i, 1) = memory(i, 1) + p1
-      memory(i, 2) = memory(i, 2) + p2
-      memory(i, 3) = e1
-      memory(i, 4) = e2
-      rows%q(b, 1) = self%stiffness(i) * (rows%cosine(b) * e1 - rows%sine(b) * e2)
-      rows%q(b, 2) = self%stiffness(i) * (rows%cosine(b) * e2 + rows%sine(b) * e1)
+      self%following(i) = (1.0_wp - self%rate) * self%following(i) + self%rate * kept(i - lo + 1)
+      if (self%following(i) >= 1.0_wp) cycle
+      rows%n = rows%n + 1
+      rows%row(rows%n) = i
+      rows%kept(rows%n) = self%following(i)
     end do
-    dissipated = block_sum(work)
-  end subroutine relax_rows
+  end subroutine lag
 
-  !> From now on the part of the springs that is kept follows the flow: at every look by this part
-  !> of what is missing. 1: at once, 0: it stays.
+  !> From now on what is kept follows the flow: at every look by this part of what is missing. 1: at
+  !> once, 0: it stays.
   subroutine follow(self, rate)
     class(relaxing_t), intent(inout) :: self
     real(wp),          intent(in)    :: rate
@@ -199,64 +172,116 @@ contains
     self%rate = rate
   end subroutine follow
 
-  !> q = c h of rows lo to hi: a small displacement of a body that has never flowed.
-  pure subroutine hold_rows(self, lo, hi, rows)
-    class(relaxing_t), intent(in) :: self
-    integer,         intent(in)    :: lo, hi
-    type(springs_t), intent(inout) :: rows
-    integer :: i, b
+  !> The springs of rows lo to hi join P: Q = kept c (R^T h - p).
+  pure subroutine join_rows(self, lo, hi, gradient, rows, memory, p)
+    class(relaxing_t), intent(inout) :: self             !! gets g
+    integer,  intent(in) :: lo, hi
+    real(wp), intent(in),    contiguous :: gradient(:, :)   !! H (n,4) xx xy yx yy
+    type(springs_t), intent(in) :: rows
+    real(wp), intent(inout), contiguous :: memory(:, :)  !! p, (n,4) [m]; gets R^T h - p
+    real(wp), intent(inout) :: p(n_block, 4)             !! P xx xy yx yy [Pa]; row 1 is row lo
+    real(wp) :: h1, h2, a, d, over, cosine, sine, e1, e2, q1, q2, couple, turns, inverse
+    integer  :: i, b
 
-    !$omp simd simdlen(8) private(b)
+    turns = self%turns
+    inverse = self%inverse_weight
+    !$omp simd simdlen(8) private(b, h1, h2, a, d, over, cosine, sine, e1, e2, q1, q2, couple)
     do i = lo, hi
       b = i - lo + 1
-      rows%q(b, 1) = self%stiffness(i) * rows%h(b, 1)
-      rows%q(b, 2) = self%stiffness(i) * rows%h(b, 2)
+      h1 = inverse * (rows%sums(b, 1) - gradient(i, 1) * self%moment(i, 1) &
+        - gradient(i, 2) * self%moment(i, 2))
+      h2 = inverse * (rows%sums(b, 2) - gradient(i, 3) * self%moment(i, 1) &
+        - gradient(i, 4) * self%moment(i, 2))
+      ! tan theta = (F_21 - F_12) / (F_11 + F_22); their squares add up to |F|^2 + 2 det F
+      a = 2.0_wp + turns * (gradient(i, 1) + gradient(i, 4))
+      d = turns * (gradient(i, 3) - gradient(i, 2))
+      over = 1.0_wp / sqrt(a**2 + d**2)
+      cosine = a * over
+      sine = d * over
+      e1 = cosine * h1 + sine * h2 - memory(i, 1)
+      e2 = cosine * h2 - sine * h1 - memory(i, 2)
+      memory(i, 3) = e1
+      memory(i, 4) = e2
+      q1 = rows%stiffness(b) * (cosine * e1 - sine * e2)
+      q2 = rows%stiffness(b) * (cosine * e2 + sine * e1)
+      couple = turns * over * (h1 * q2 - h2 * q1)
+      q1 = inverse * q1
+      q2 = inverse * q2
+      p(b, 1) = p(b, 1) - q1 * self%moment(i, 1) + couple * sine
+      p(b, 2) = p(b, 2) - q1 * self%moment(i, 2) + couple * cosine
+      p(b, 3) = p(b, 3) - q2 * self%moment(i, 1) - couple * cosine
+      p(b, 4) = p(b, 4) - q2 * self%moment(i, 2) + couple * sine
+      self%pull(i, 1) = q1
+      self%pull(i, 2) = q2
+    end do
+  end subroutine join_rows
+
+  !> Let the rows of a block that let go remember it:
+  !>
+  !>   p_{n+1} = R^T h - Q / c
+  !>
+  !> The work of the force in a step is that of the mean of Q_n and Q_{n+1}, and so is its part that
+  !> is dissipated.
+  pure subroutine remember(self, rows, memory, dissipated)
+    class(relaxing_t), intent(in) :: self
+    type(springs_t), intent(in) :: rows
+    real(wp), intent(inout), contiguous :: memory(:, :)   !! p, R^T h - p (n,4) [m] -> p, Q / c
+    real(wp), intent(out) :: dissipated                   !! in this step [J/m]
+    real(wp) :: gone(2)
+    integer  :: i, k
+
+    dissipated = 0.0_wp
+    do k = 1, rows%n
+      i = rows%row(k)
+      gone = (1.0_wp - rows%kept(k)) * memory(i, 3:4)
+      memory(i, 1:2) = memory(i, 1:2) + gone
+      memory(i, 3:4) = rows%kept(k) * memory(i, 3:4)
+      dissipated = dissipated + 0.5_wp * self%volume(i) * self%stiffness(i) &
+        * ((rows%before(k, 1) + memory(i, 3)) * gone(1) &
+        + (rows%before(k, 2) + memory(i, 4)) * gone(2))
+    end do
+  end subroutine remember
+
+  !> The same for a small displacement of a body that has never flowed: q = c h.
+  pure subroutine hold_rows(self, lo, hi, gradient, rows, p)
+    class(relaxing_t), intent(inout) :: self             !! gets g
+    integer,  intent(in) :: lo, hi
+    real(wp), intent(in), contiguous :: gradient(:, :)   !! H (n,4) xx xy yx yy
+    type(springs_t), intent(in) :: rows
+    real(wp), intent(inout) :: p(n_block, 4)             !! P xx xy yx yy [Pa]; row 1 is row lo
+    real(wp) :: factor, g1, g2
+    integer  :: i, b
+
+    !$omp simd simdlen(8) private(b, factor, g1, g2)
+    do i = lo, hi
+      b = i - lo + 1
+      factor = self%inverse_weight**2 * self%stiffness(i)
+      g1 = factor * (rows%sums(b, 1) - gradient(i, 1) * self%moment(i, 1) &
+        - gradient(i, 2) * self%moment(i, 2))
+      g2 = factor * (rows%sums(b, 2) - gradient(i, 3) * self%moment(i, 1) &
+        - gradient(i, 4) * self%moment(i, 2))
+      p(b, 1) = p(b, 1) - g1 * self%moment(i, 1)
+      p(b, 2) = p(b, 2) - g1 * self%moment(i, 2)
+      p(b, 3) = p(b, 3) - g2 * self%moment(i, 1)
+      p(b, 4) = p(b, 4) - g2 * self%moment(i, 2)
+      self%pull(i, 1) = g1
+      self%pull(i, 2) = g2
     end do
   end subroutine hold_rows
 
-  !> Take what h has from H off P, and keep g, for rows lo to hi.
-  pure subroutine join_rows(self, lo, hi, rows, p)
-    class(relaxing_t), intent(inout) :: self
-    integer,         intent(in)    :: lo, hi
-    type(springs_t), intent(in)    :: rows
-    real(wp),        intent(inout) :: p(n_block, 4)   !! P xx xy yx yy [Pa]; row 1 is row lo
-    real(wp) :: g1, g2, couple
-    integer  :: i, b
-
-    associate (s => self%moment, inverse => self%inverse_weight, turns => self%turns)
-      !$omp simd simdlen(8) private(b, g1, g2, couple)
-      do i = lo, hi
-        b = i - lo + 1
-        g1 = inverse(i) * rows%q(b, 1)
-        g2 = inverse(i) * rows%q(b, 2)
-        couple = turns * rows%inverse_length(b) &
-          * (rows%h(b, 1) * rows%q(b, 2) - rows%h(b, 2) * rows%q(b, 1))
-        p(b, 1) = p(b, 1) - g1 * s(i, 1) + couple * rows%sine(b)
-        p(b, 2) = p(b, 2) - g1 * s(i, 2) + couple * rows%cosine(b)
-        p(b, 3) = p(b, 3) - g2 * s(i, 1) - couple * rows%cosine(b)
-        p(b, 4) = p(b, 4) - g2 * s(i, 2) + couple * rows%sine(b)
-        self%pull(i, 1) = g1
-        self%pull(i, 2) = g2
-      end do
-    end associate
-  end subroutine join_rows
-
-  !> Energy of the springs of rows lo to hi, sum V c |R^T h - p|^2 / 2 [J/m].
-  pure real(wp) function stored(self, lo, hi, rows, memory)
+  !> Energy of the springs of rows lo to hi, sum V |Q|^2 / (2 c) [J/m].
+  pure real(wp) function stored(self, lo, hi, memory)
     class(relaxing_t), intent(in) :: self
-    integer,         intent(in) :: lo, hi
-    type(springs_t), intent(in) :: rows
+    integer,  intent(in) :: lo, hi
     real(wp), intent(in), contiguous :: memory(:, :)   !! p, Q / c (n,4) [m]
-    real(wp) :: energy(n_block), e1, e2
-    integer  :: i, b
+    real(wp) :: energy(n_block)
+    integer  :: i
 
     energy = 0.0_wp
-    !$omp simd simdlen(8) private(b, e1, e2)
+    !$omp simd simdlen(8)
     do i = lo, hi
-      b = i - lo + 1
-      e1 = rows%cosine(b) * rows%h(b, 1) + rows%sine(b) * rows%h(b, 2) - memory(i, 1)
-      e2 = rows%cosine(b) * rows%h(b, 2) - rows%sine(b) * rows%h(b, 1) - memory(i, 2)
-      energy(b) = 0.5_wp * self%volume(i) * self%stiffness(i) * (e1**2 + e2**2)
+      energy(i - lo + 1) = 0.5_wp * self%volume(i) * self%stiffness(i) &
+        * (memory(i, 3)**2 + memory(i, 4)**2)
     end do
     stored = block_sum(energy)
   end function stored

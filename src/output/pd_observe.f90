@@ -117,8 +117,7 @@ contains
     row%moment = moment
     call model%operators%control_energy(model%points%volume, state%displacement, &
       state%displacement_gradient, row%control_energy)
-    call model%operators%relaxing_energy(state%displacement, state%displacement_gradient, &
-      state%control_memory, held)
+    call model%operators%relaxing_energy(state%control_memory, held)
     row%control_energy = row%control_energy + held
     call look_at_forces(model, state, moment%time, row%unbalanced)
     allocate (row%seen%names(size(columns)), source=columns%name)

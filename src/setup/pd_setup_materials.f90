@@ -146,7 +146,7 @@ contains
     if (family%weight <= 0.0_wp) then
       call errors%add('the relaxing control needs bonds of different lengths', &
         where='&stabilisation, key method', found='one length in every family', &
-        allowed='a horizon of at least 1.5 spacings, or another control')
+        allowed='a horizon of at least 1.5 spacings, or method = ''none'' or ''silling''')
       return
     end if
     allocate (youngs_modulus(model%operators%n), source=0.0_wp)

@@ -45,6 +45,7 @@ INPUT = """\
   damping = 5e5, damping_frame = 'platens' /
 &output frame_count = 1, history_count = {rows} /
 """
+PLAIN = "&stabilisation method = 'none' /\n"
 CONTROL = "&stabilisation method = 'silling', factor = 0.0125 /\n"
 
 
@@ -101,7 +102,7 @@ def lattice_case(
         rows=max(1, steps // 10),
     )
     path = folder / f"{name}.nml"
-    path.write_text(text + more)
+    path.write_text(text + (more or PLAIN))
     return run(path, folder, name, threads, program)
 
 
@@ -121,7 +122,7 @@ def set_up_seconds(side: int, m: int, threads: int) -> float:
         rows=1,
     ).replace("time_step_rule = 'fixed', time_step = 0.0,", "time_step_rule = 'spectral',")
     path = RESULTS / "set_up.nml"
-    path.write_text(text)
+    path.write_text(text + PLAIN)
     start = time.perf_counter()
     command = [str(PROGRAM), "--check", "--threads", str(threads), str(path)]
     if subprocess.run(command, stdout=subprocess.DEVNULL).returncode != 0:
@@ -159,7 +160,7 @@ def cloud_case(points: int, steps: int, threads: int) -> dict[str, float]:
     )
     text = text.replace("&body ", "&body shape = 'file', file = 'points.txt', ")
     path = folder / f"{name}.nml"
-    path.write_text(text)
+    path.write_text(text + PLAIN)
     return run(path, folder, name, threads)
 
 

@@ -5,6 +5,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
+from case_files import uncontrolled
 
 ROOT = Path(__file__).resolve().parents[2]
 TIME_LIMIT = 600.0  # seconds for one run of the program
@@ -50,7 +51,7 @@ def run_case(perigeo):
         path = Path(case) if isinstance(case, Path) or "&" not in case else None
         if path is None:
             path = Path(folder) / "run.nml"
-            path.write_text(case)
+            path.write_text(uncontrolled(case))
         return perigeo([*options, path], folder, **environment)
 
     return run

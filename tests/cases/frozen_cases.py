@@ -14,7 +14,7 @@ from pathlib import Path
 
 import h5py
 import numpy as np
-from case_files import changed
+from case_files import changed, uncontrolled
 
 FOLDER = Path(__file__).parent / "frozen"
 DIGITS = 12
@@ -146,7 +146,7 @@ def run(program, case, folder, threads):
     """Run a case and return its quantities."""
     folder.mkdir(parents=True)
     (folder / "cloud.txt").write_text(cloud())
-    (folder / "run.nml").write_text(CASES[case])
+    (folder / "run.nml").write_text(uncontrolled(CASES[case]))
     done = subprocess.run(
         [str(program), "--quiet", "--threads", str(threads), "run.nml"],
         cwd=folder,
@@ -166,7 +166,7 @@ def run_in_two(program, case, folder):
     """Run a case that is stopped by a signal and goes on; return its quantities."""
     folder.mkdir(parents=True)
     (folder / "cloud.txt").write_text(cloud())
-    (folder / "run.nml").write_text(CASES[case])
+    (folder / "run.nml").write_text(uncontrolled(CASES[case]))
     command = [str(program), "--quiet", "--threads", "1", "run.nml"]
     rows = folder / "out" / "case_history.csv"
     process = subprocess.Popen(

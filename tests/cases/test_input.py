@@ -7,6 +7,7 @@ from pathlib import Path
 
 import h5py
 import pytest
+from case_files import uncontrolled
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -339,11 +340,17 @@ def test_inputs_printed_read_back(perigeo, tmp_path, path):
     assert again.stdout == printed.stdout, again.stderr
 
 
+def test_what_is_absent_is_the_control_that_lets_go(perigeo, tmp_path):
+    (tmp_path / "run.nml").write_text(VALID)
+    printed = perigeo(["--print-input", "run.nml"], tmp_path)
+    assert "method = 'relaxing'" in printed.stdout
+
+
 def test_a_run_with_settings_stores_them_beside_the_file(run_case, tmp_path):
     done = run_case(VALID, tmp_path, "--set", "material.density=1800", "--quiet")
     assert done.returncode == 0, done.stderr
     with h5py.File(tmp_path / "results" / "case" / "case.h5") as results:
-        assert results["input/namelist"][()] == VALID.encode()
+        assert results["input/namelist"][()] == uncontrolled(VALID).encode()
         values = [line.strip() for line in results["input/values"].asstr()[()]]
         assert "material.density = 1800.0" in values
         assert b"--set material.density=1800" in bytes(results.attrs["command_line"])

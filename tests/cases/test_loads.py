@@ -7,7 +7,14 @@ import time
 import h5py
 import numpy as np
 import pytest
-from case_files import SPECIMEN, changed, history, same_points_and_frames, without_group
+from case_files import (
+    SPECIMEN,
+    changed,
+    history,
+    same_points_and_frames,
+    uncontrolled,
+    without_group,
+)
 
 YOUNGS, NU = 50.0e6, 0.3
 P = 20.0e3
@@ -289,7 +296,7 @@ def straight(run_case, tmp_path_factory):
 
 def stopped(program, folder, text, rows):
     """Run until the history has some rows, and stop by a signal."""
-    (folder / "run.nml").write_text(text)
+    (folder / "run.nml").write_text(uncontrolled(text))
     process = subprocess.Popen(
         [program, "--quiet", "--threads", "1", "run.nml"],
         cwd=folder,

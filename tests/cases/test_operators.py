@@ -8,7 +8,7 @@ import time
 import h5py
 import numpy as np
 import pytest
-from case_files import SPECIMEN, changed, contents, history, same_points_and_frames
+from case_files import SPECIMEN, changed, contents, history, same_points_and_frames, uncontrolled
 
 FORMS = ("list", "lattice")
 ROUND_OFF = 1e-10
@@ -192,7 +192,7 @@ LONG = changed(HARDENING, end_time="0.6", time_step="1.0e-4", history_count="100
 def stopped(program, folder, text):
     """Stop a run in the middle by a signal, so that it leaves a checkpoint."""
     folder.mkdir()
-    (folder / "run.nml").write_text(text)
+    (folder / "run.nml").write_text(uncontrolled(text))
     process = subprocess.Popen(
         [program, "--quiet", "--threads", "1", "run.nml"],
         cwd=folder,

@@ -9,7 +9,14 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from case_files import SPECIMEN, changed, history, same_points_and_frames, without_group
+from case_files import (
+    SPECIMEN,
+    changed,
+    history,
+    same_points_and_frames,
+    uncontrolled,
+    without_group,
+)
 
 ROOT = Path(__file__).resolve().parents[2]
 UNIFORM = without_group(SPECIMEN, "imperfection")
@@ -170,7 +177,7 @@ def test_a_run_goes_on_with_the_same_soil_and_with_no_other(program, run_case, t
     run(run_case, tmp_path / "straight", text, "--quiet")
     folder = tmp_path / "stopped"
     folder.mkdir()
-    (folder / "run.nml").write_text(text)
+    (folder / "run.nml").write_text(uncontrolled(text))
     process = subprocess.Popen([program, "--quiet", "run.nml"], cwd=folder)
     rows = folder / "out" / "case_history.csv"
     while process.poll() is None and not (rows.exists() and rows.read_bytes().count(b"\n") > 20):

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import h5py
 import pytest
-from case_files import SPECIMEN, changed, contents, history, same_points_and_frames
+from case_files import SPECIMEN, changed, contents, history, same_points_and_frames, uncontrolled
 
 # Long enough to be hit in the middle by a signal, with many rows and frames.
 LONG = changed(SPECIMEN, final_strain="0.04", history_count="400", spacing="0.05", horizon="0.16")
@@ -30,7 +30,7 @@ def straight(run_case, tmp_path_factory):
 
 def begin(program, folder, text, *options):
     """Start the long run in the background."""
-    (folder / "run.nml").write_text(text)
+    (folder / "run.nml").write_text(uncontrolled(text))
     return subprocess.Popen(
         [program, "--quiet", "--threads", "1", *options, "run.nml"],
         cwd=folder,

@@ -82,7 +82,11 @@ def run(name: str, groups: Groups) -> Run:
     folder = RESULTS / name
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"{name}.nml"
-    path.write_text(namelist([("run", {"name": name, "output_dir": str(folder)}), *groups]))
+    always = [
+        ("run", {"name": name, "output_dir": str(folder)}),
+        ("stabilisation", {"method": "none"}),  # closed forms of the plain operators
+    ]
+    path.write_text(namelist([*always, *groups]))
     command = [str(PROGRAM), "--threads", "1", "--force", "--quiet", str(path)]
     return execute(name, folder, command)
 

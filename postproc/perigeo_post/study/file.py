@@ -68,12 +68,15 @@ def load_study(path: Path, kinds: Kinds, inputs: Inputs) -> Study:
     top = read_tables(data, problems)
     if top is None:
         raise StudyError(problems.list)
-    base = _base(top, path, problems)
     levels = _levels(top, kinds, problems)
     inputs.begin(top.name)
-    planner = Planner(path.parent / top.base, path, inputs, problems)
-    if base is not None:
-        for name, level in levels.items():
+    planner = Planner(path, inputs, problems)
+    readable: dict[str, bool] = {}
+    for name, level in levels.items():
+        if level.base not in readable:
+            place = level.at("base") if level.base != top.base else ("base",)
+            readable[level.base] = _readable(level.base, path, place, problems)
+        if readable[level.base]:
             planner.add_series(name, level, name if level.place else "", top.name)
     runs = planner.runs
 
@@ -103,18 +106,17 @@ def load_study(path: Path, kinds: Kinds, inputs: Inputs) -> Study:
     )
 
 
-def _base(top: StudyTable, path: Path, problems: Problems) -> Path | None:
-    """The file of the base; None where it cannot be read."""
-    base = path.parent / top.base
-    if not top.base:
-        return None
+def _readable(base: str, path: Path, place: Key, problems: Problems) -> bool:
+    """Whether the file of a base can be read."""
+    if not base:
+        return False
     try:
-        base.read_bytes()
+        (path.parent / base).read_bytes()
     except OSError as error:
         what = f"the base cannot be read: {error.strerror}"
-        problems.add(("base",), what, top.base, "relative to this file")
-        return None
-    return base
+        problems.add(place, what, base, "relative to this file")
+        return False
+    return True
 
 
 def _levels(top: StudyTable, kinds: Kinds, problems: Problems) -> dict[str, Level]:

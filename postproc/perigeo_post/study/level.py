@@ -34,6 +34,7 @@ class Level:
     strain: Any
     line: Any
     sampled: Any
+    base: str
     place: Key
     title: str
 
@@ -60,6 +61,7 @@ class Level:
             strain=top.strain if self.strain is None else self.strain,
             line=top.line if self.line is None else self.line,
             sampled=top.sampled if self.sampled is None else self.sampled,
+            base=self.base or top.base,
             place=self.place,
             title=self.title,
         )
@@ -81,6 +83,7 @@ def level_of(table: LevelTable, place: Key, name: str) -> Level:
         strain=table.strain,
         line=table.line,
         sampled=table.sampled,
+        base=table.base,
         place=place,
         title=table.title or name,
     )

@@ -31,6 +31,7 @@ from ..measure.softening import softening_branch, strain_rate
 from ..read.errors import FieldNotFoundError, RequestError
 from ..read.points import FloatArray
 from ..read.run import Run
+from .control import CONTROL, LOAD
 from .growth import CHANGE, START
 from .parts import Part, Values, frame_of, measure_group, value_or
 from .types import Column, Measure, State
@@ -411,5 +412,7 @@ MEASURES: dict[str, Measure] = {
     ),
     "start": START,
     "change": CHANGE,
+    "control": CONTROL,
+    "load": LOAD,
     "field": measure_group({_field: _FIELD, _field_in_band: _FIELD_IN_BAND}),
 }

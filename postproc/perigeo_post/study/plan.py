@@ -64,8 +64,7 @@ class PlannedRun:
 class Planner:
     """Makes the runs of a study from its levels."""
 
-    def __init__(self, base: Path, study: Path, inputs: Inputs, problems: Problems) -> None:
-        self.base = base
+    def __init__(self, study: Path, inputs: Inputs, problems: Problems) -> None:
         self.folder = study.parent
         self.inputs = inputs
         self.problems = problems
@@ -109,7 +108,8 @@ class Planner:
             return None
         label = self._label(level, case, number, swept, parameters)
         edits = [*level.edits, *case.edits]
-        values = self._values(edits, parameters)
+        base = self.folder / level.base
+        values = self._values(base, edits, parameters)
         state = self._state(level, parameters, values, label or _slug(case, number, swept))
         if values is None or label is None:
             return None
@@ -120,7 +120,7 @@ class Planner:
             parameters=parameters,
             values=values,
             given=frozenset(key.lower() for _, key, _ in edits),
-            files=self._take_files(values),
+            files=self._take_files(base, values),
             state=state,
             measures=tuple(level.measures),
         )
@@ -147,7 +147,9 @@ class Planner:
                 return None
         return found
 
-    def _values(self, edits: list[Edit], parameters: Mapping[str, Value]) -> Values | None:
+    def _values(
+        self, base: Path, edits: list[Edit], parameters: Mapping[str, Value]
+    ) -> Values | None:
         """The values of the base with all changes; None where there are mistakes."""
         # A base without a name is none that the program takes; each run gets its own later.
         settings: list[tuple[str, Key]] = [("run.name=run", ())]
@@ -161,7 +163,7 @@ class Planner:
                 self.problems.add(place, str(error))
                 good = False
         try:
-            values = self.inputs.values(self.base, self.folder, [text for text, _ in settings])
+            values = self.inputs.values(base, self.folder, [text for text, _ in settings])
         except InputError as error:
             self._blame(error.lines, settings, good)
             return None
@@ -247,12 +249,12 @@ class Planner:
             self.problems.add(at("sampled"), str(error))
         return State(strain=strain, line=line, sampled=sampled)
 
-    def _take_files(self, values: Values) -> dict[str, Path]:
+    def _take_files(self, base: Path, values: Values) -> dict[str, Path]:
         """Files of points go beside the input of the run."""
         found: dict[str, Path] = {}
         for _, entries in (group for group in values.groups if "file" in group[1]):
             name = unquoted(entries["file"])
-            folders = (self.base.parent, self.folder)
+            folders = (base.parent, self.folder)
             source = next((f / name for f in folders if (f / name).is_file()), None)
             if source is None:
                 self.problems.add(("base",), "the file of points is not there", name)

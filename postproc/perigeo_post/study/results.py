@@ -46,6 +46,7 @@ MEASURING = (
     "study/parts.py",
     "study/measures.py",
     "study/growth.py",
+    "study/control.py",
     "study/expressions.py",
     "study/findings.py",
 )

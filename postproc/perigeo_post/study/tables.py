@@ -219,6 +219,7 @@ class LevelTable(_Table):
     """What may stand at the top of the file and in each series."""
 
     title: Text = ""
+    base: Text = ""
     strain: Annotated[Any, AfterValidator(_strain)] = None
     line: Annotated[Any, AfterValidator(_line)] = None
     sampled: Annotated[Any, AfterValidator(_spacing)] = None
