@@ -67,7 +67,7 @@ contains
       also='only with platens', meaning='nominal strain at which the run ends'), &
       self%final_strain)
     call visitor%text_key(key_t('time_step_rule', default='spectral', &
-      choices='courant spectral fixed', &
+      choices='courant spectral fixed', needs_effect=.true., &
       meaning='courant: safety * spacing / c_p; spectral: safety * 2 / (largest frequency); ' &
       //'fixed: time_step'), self%time_step_rule)
     call visitor%real_key(key_t('time_step', unit='s', range=positive, &
@@ -78,9 +78,10 @@ contains
       also='below 1 for the rule spectral; not with fixed', &
       meaning='factor on the time step of the rule'), self%safety)
     call visitor%real_key(key_t('damping', unit='kg/(m^3 s)', default='0.0', range=not_negative, &
-      meaning='force per volume and velocity against the motion, C'), self%damping)
+      needs_effect=.true., meaning='force per volume and velocity against the motion, C'), &
+      self%damping)
     call visitor%text_key(key_t('damping_frame', default='rest', choices='rest platens', &
-      also='platens: only with platens', &
+      needs_effect=.true., also='platens: only with platens', &
       meaning='rest: damping against rest, the body starts at rest; platens: against the ' &
       //'affine velocity between the platens, with which the body also starts'), &
       self%damping_frame)
