@@ -23,6 +23,7 @@ from .band import (
 from .band_fit import fitted_width
 from .band_search import find_bands, search_scale
 from .curves import curve_numbers, modulus_numbers, peak, stress_strain
+from .limit_load import limit_loads
 
 
 def frame_profile(frame: Frame, line: Line, field: str = "plastic_strain") -> Profile:
@@ -212,6 +213,7 @@ def _history_facts(run: Run) -> dict[str, Any]:
             facts.update({k: v for k, v in curve_numbers(run).items() if k not in ("run", "file")})
         except FieldNotFoundError as error:
             facts["curve_missing"] = str(error)
+    facts["limit_loads"] = [asdict(one) for one in limit_loads(run)]
     if "energy_error" in history and history.rows:
         facts["largest_energy_error"] = float(np.nanmax(np.abs(history["energy_error"])))
     return facts
