@@ -19,6 +19,7 @@ from ..read.run import Run
 
 LAST = 0.2  # part of the way that is looked at
 CHANGE = 0.01  # by which the force may change there
+ROUND_OFF = 1e-9
 ROWS = 4  # of the history in that part, at the least
 AXES = ("x", "y")
 
@@ -61,9 +62,10 @@ def limit_load(run: Run, boundary: str | None = None) -> LimitLoad:
 
 def _limit_load(name: str, way: tuple[FloatArray, FloatArray], history: History) -> LimitLoad:
     path, place = way
-    late = path >= (1.0 - LAST) * path[-1]
-    first = int(np.argmax(late))
-    direction = place[-1] - place[first]
+    # Rows after the boundary has come to rest do not count, however many there are.
+    first, end = np.searchsorted(path, (np.array([1.0 - LAST, 1.0]) - ROUND_OFF) * path[-1])
+    late = slice(int(first), int(end) + 1)
+    direction = place[end] - place[first]
     length = float(np.hypot(*direction))
     size = len(path)
     force = np.column_stack([history[f"{name}_force_{axis}"][:size] for axis in AXES])
@@ -72,7 +74,7 @@ def _limit_load(name: str, way: tuple[FloatArray, FloatArray], history: History)
     mean = float(last.mean())
     change = float(np.ptp(last)) / abs(mean) if mean != 0.0 else float("nan")
     missing = ""
-    if late.sum() < ROWS:
+    if len(last) < ROWS:
         missing = f"the last fifth of its way has fewer than {ROWS} rows of the history"
     elif not np.isfinite(change):
         missing = "it has no force along its motion"
@@ -132,4 +134,6 @@ def _numbers(run: Run, name: str, key: str) -> FloatArray:
         parts = [re.sub("[dD]", "e", part) for part in re.split(r"[,\s]+", text) if part]
         return np.array([float(part) for part in parts])
     except ValueError:
-        raise PostError(f"{run.path}: boundary({name}).{key} = {text} is no list of numbers") from None
+        raise PostError(
+            f"{run.path}: boundary({name}).{key} = {text} is no list of numbers"
+        ) from None

@@ -213,7 +213,8 @@ def _history_facts(run: Run) -> dict[str, Any]:
             facts.update({k: v for k, v in curve_numbers(run).items() if k not in ("run", "file")})
         except FieldNotFoundError as error:
             facts["curve_missing"] = str(error)
-    facts["limit_loads"] = [asdict(one) for one in limit_loads(run)]
+    if "time" in history:
+        facts["limit_loads"] = [asdict(one) for one in limit_loads(run)]
     if "energy_error" in history and history.rows:
         facts["largest_energy_error"] = float(np.nanmax(np.abs(history["energy_error"])))
     return facts
