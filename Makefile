@@ -49,7 +49,8 @@ build    := build/$(BUILD)
 # ---------------------------------------------------------------------------------- targets
 .SUFFIXES:
 .DELETE_ON_ERROR:
-studies := fig3a fig3b fig4 fig5 horizon loading size softening influence heterogeneity
+studies := fig3a fig3b fig4 fig5 horizon loading size softening influence heterogeneity \
+  equilibrium
 .PHONY: all program objects post debug units demo demo-quick test lint verify \
   layers setup install help clean distclean figures $(studies) \
   report report-view site bench
@@ -88,7 +89,9 @@ size:              ## study: size and shape of the specimen
 softening:         ## study: kinds of softening, its modulus, the residual strength
 influence:         ## study: influence functions
 heterogeneity:     ## study: soil whose strength varies from place to place
-figures: asked = $(studies)
+equilibrium:       ## studies: motion or equilibrium after the peak, limit load of a footing
+equilibrium: asked = equilibrium footing
+figures: asked = $(studies) footing
 figures $(studies):
 	@sh tools/setup.sh run
 	@$(submake) $(parallel) program

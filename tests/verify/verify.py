@@ -614,9 +614,8 @@ def shipped(path: str, *settings: str, name: str = "", threads: int = 1) -> Run:
     return execute(name, folder, [*command, str(ROOT / "input" / f"{path}.nml")])
 
 
-AT_EQUILIBRIUM = (
-    "integration.method=equilibrium",
-    "integration.damping=",
+AT_EQUILIBRIUM = ("integration.method=equilibrium", "integration.damping=")
+OF_MOTION = (
     "integration.damping_frame=",
     "integration.time_step_rule=",
     "integration.safety=",
@@ -652,6 +651,7 @@ def compression_at_equilibrium() -> list[Row]:
         runs[count] = shipped(
             "compression",
             *AT_EQUILIBRIUM,
+            *OF_MOTION,
             *settings,
             f"integration.increments={count}",
             name=f"compression_equilibrium_{count}",
