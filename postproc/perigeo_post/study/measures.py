@@ -6,15 +6,12 @@ value stands why there is none. doc/results.md defines the quantities.
 
 from __future__ import annotations
 
-import re
-from collections.abc import Callable, Mapping
-from typing import Union
+from collections.abc import Callable
 
 import numpy as np
 
 from ..measure.band import LEVEL, BandMeasure, Line
 from ..measure.curves import apparent_modulus, peak, stress_strain
-from ..measure.limit_load import limit_load
 from ..measure.measures import frame_bands, largest_plastic_strain, measure_band
 from ..measure.moduli import gauge_modulus, mean_modulus
 from ..measure.pattern import pattern_of
@@ -26,47 +23,14 @@ from ..measure.quality import (
     reaction_gap,
 )
 from ..measure.softening import softening_branch, strain_rate
-from ..read.errors import FieldNotFoundError, PostError, RequestError
+from ..read.errors import FieldNotFoundError, RequestError
 from ..read.points import FloatArray
 from ..read.run import Frame, Run
-from .types import Column, Measure, Missing, State, Value
+from .groups import Part, Values, group, value_or
+from .loads import COST, LOAD
+from .types import Column, Measure, State
 
 STRAINS = {"0_5": 0.005, "1_0": 0.010, "1_5": 0.015}  # at which the stress is listed
-
-Values = dict[str, Union[Value, Missing]]
-Part = Callable[[Run, State], Values]
-
-
-def _measure(parts: Mapping[Part, Mapping[str, Column]]) -> Measure:
-    """A group of columns: what gives values, each with its columns, may fail by itself."""
-
-    def take(run: Run, state: State) -> Values:
-        found: Values = {}
-        for part, columns in parts.items():
-            try:
-                values = part(run, state)
-            except (PostError, ValueError, ArithmeticError, np.linalg.LinAlgError) as error:
-                reason = str(error) if isinstance(error, PostError) else type(error).__name__
-                found.update(dict.fromkeys(columns, Missing(reason)))
-            else:
-                found.update({name: _plain(values[name]) for name in columns})
-        return found
-
-    return Measure({k: v for columns in parts.values() for k, v in columns.items()}, take)
-
-
-def _plain(value: Value | Missing) -> Value | Missing:
-    """Python's own numbers, a reason for what is not finite."""
-    if isinstance(value, (bool, str, int, Missing)):
-        return value
-    number = float("nan") if value is None else float(value)
-    return number if np.isfinite(number) else Missing("it has no finite value in this run")
-
-
-def _or(value: Value, reason: str) -> Value | Missing:
-    """A value; the reason where it is none or not finite."""
-    found = _plain(value)
-    return Missing(reason) if isinstance(found, Missing) else found
 
 
 def frame_of(run: Run, state: State) -> Frame:
@@ -97,10 +61,10 @@ def _curve(run: Run, state: State) -> Values:
     last = (float(curve.x[-1]), float(curve.y[-1])) if len(curve.x) else (None, None)
     none = "the history has no row with a stress"
     return {
-        "peak_stress": _or(stress, none),
-        "strain_at_peak": _or(strain, none),
-        "last_strain": _or(last[0], none),
-        "last_stress": _or(last[1], none),
+        "peak_stress": value_or(stress, none),
+        "strain_at_peak": value_or(strain, none),
+        "last_strain": value_or(last[0], none),
+        "last_stress": value_or(last[1], none),
     }
 
 
@@ -215,11 +179,11 @@ def _band(run: Run, state: State) -> Values:
     fitted, read, strong = found.widths[0], found.interpolated, found.bands.prevailing
     none = "no profile could be fitted along the band"
     return {
-        "width": _or(fitted.width, none),
-        "width_spread": _or(fitted.spread, none),
-        "width_over_horizon": _or(fitted.width / found.horizon, none),
-        "width_over_horizon_spread": _or(fitted.spread / found.horizon, none),
-        "width_over_spacing": _or(fitted.width / found.spacing, none),
+        "width": value_or(fitted.width, none),
+        "width_spread": value_or(fitted.spread, none),
+        "width_over_horizon": value_or(fitted.width / found.horizon, none),
+        "width_over_horizon_spread": value_or(fitted.spread / found.horizon, none),
+        "width_over_spacing": value_or(fitted.width / found.spacing, none),
         "width_interpolated": read.width,
         "width_interpolated_uncertainty": read.uncertainty,
         "width_interpolated_closed": read.closed,
@@ -238,10 +202,10 @@ def _pattern(run: Run, state: State) -> Values:
     found = pattern_of(frame_of(run, state))
     nothing = "there is no earlier frame, or no band in what has grown since"
     return {
-        "band_ratio": _or(found.ratio, f"the pattern is {found.name}"),
-        "band_ratio_growing": _or(found.ratio_growing, nothing),
+        "band_ratio": value_or(found.ratio, f"the pattern is {found.name}"),
+        "band_ratio_growing": value_or(found.ratio_growing, nothing),
         "pattern": found.name,
-        "pattern_growing": _or(found.growing, nothing),
+        "pattern_growing": value_or(found.growing, nothing),
     }
 
 
@@ -337,22 +301,24 @@ def _branch(run: Run, state: State) -> Values:
     found = softening_branch(run)
     early = "the run ends before the stress has fallen that far"
     return {
-        "strain_at_90": _or(found.strain_upper, early),
-        "strain_at_50": _or(found.strain_lower, early),
-        "softening_slope": _or(found.slope, early),
-        "softening_displacement": _or(found.displacement, early),
+        "strain_at_90": value_or(found.strain_upper, early),
+        "strain_at_50": value_or(found.strain_lower, early),
+        "softening_slope": value_or(found.slope, early),
+        "softening_displacement": value_or(found.displacement, early),
     }
 
 
 def _brittleness(run: Run, state: State) -> Values:
     slope = softening_branch(run).slope / apparent_modulus(run).slope
-    return {"brittleness": _or(slope, "the run ends before the stress has fallen to 50 %")}
+    return {"brittleness": value_or(slope, "the run ends before the stress has fallen to 50 %")}
 
 
 def _stresses(run: Run, state: State) -> Values:
     curve = stress_strain(run)
     return {
-        f"stress_{name}": _or(curve.at(curve.toward(strain)), "the run does not reach this strain")
+        f"stress_{name}": value_or(
+            curve.at(curve.toward(strain)), "the run does not reach this strain"
+        )
         for name, strain in STRAINS.items()
     }
 
@@ -418,72 +384,11 @@ def _field_in_band(run: Run, state: State) -> Values:
     }
 
 
-# ---- load and cost -------------------------------------------------------------------------
-
-_LOAD = {
-    "limit_load": Column(
-        "N/m", "mean force of the first boundary that moves, along its motion, over the last fifth"
-    ),
-    "limit_load_change": Column("1", "its largest less its smallest there, over the mean"),
-    "limit_load_reached": Column("1", "true: it changes by less than 1 %"),
-    "load_peak": Column("N/m", "largest force of that boundary along its motion"),
-    "load_end": Column("N/m", "the same at the end of the run"),
-}
-_EVALUATIONS = {
-    "force_evaluations": Column("1", "evaluations of the forces: one a step, or a move"),
-}
-_BALANCES = {
-    "unbalanced_force_largest": Column(
-        "1", "largest sum of unbalanced forces over reactions and loads in the second half"
-    ),
-    "damping_share_largest": Column(
-        "1", "largest part of reactions and loads that damping carries in the second half"
-    ),
-}
-
-
-def _load(run: Run, state: State) -> Values:
-    found = limit_load(run)
-    reason = found.missing or "its force has no finite value"
-    return {
-        "limit_load": _or(found.load, reason),
-        "limit_load_change": _or(found.change, reason),
-        "limit_load_reached": Missing(reason) if found.missing else found.reached,
-        "load_peak": _or(found.peak, reason),
-        "load_end": _or(found.end, reason),
-    }
-
-
-def _evaluations(run: Run, state: State) -> Values:
-    """From the log where the run is at equilibrium; a run that was continued tells a part only."""
-    if run.value("integration.method") != "equilibrium":
-        return {"force_evaluations": int(run.history()["step"][-1])}
-    log = run.path.with_suffix(".log")
-    try:
-        text = log.read_text(encoding="utf-8", errors="replace")
-    except OSError:
-        raise RequestError(f"there is no log {log}, which tells the evaluations") from None
-    found = re.findall(r"evaluations of the forces +(\d+)", text)
-    whole = re.findall(r"^time loop .*, steps +(\d+)", text, re.MULTILINE)
-    if not found or int(whole[-1]) != int(run.history()["step"][-1]):
-        raise RequestError(f"the log {log} does not tell the evaluations of the whole run")
-    return {"force_evaluations": int(found[-1])}
-
-
-def _balances(run: Run, state: State) -> Values:
-    history = run.history()
-    late = history["time"] >= 0.5 * history["time"][-1]
-    return {
-        f"{name}_largest": float(np.nanmax(history[name][late]))
-        for name in ("unbalanced_force", "damping_share")
-    }
-
-
 MEASURES: dict[str, Measure] = {
-    "curve": _measure({_curve: _CURVE, _curve_at_state: _AT_STATE, _frame_numbers: _FRAME}),
-    "modulus": _measure({_modulus(name): {name: about} for name, (about, _) in _MODULUS.items()}),
-    "band": _measure({_band: _BAND, _pattern: _PATTERN}),
-    "quality": _measure(
+    "curve": group({_curve: _CURVE, _curve_at_state: _AT_STATE, _frame_numbers: _FRAME}),
+    "modulus": group({_modulus(name): {name: about} for name, (about, _) in _MODULUS.items()}),
+    "band": group({_band: _BAND, _pattern: _PATTERN}),
+    "quality": group(
         {
             _kinetic: _KINETIC,
             _bound: _KINETIC_BOUND,
@@ -492,7 +397,7 @@ MEASURES: dict[str, Measure] = {
             _zero_energy: _ZERO_ENERGY,
         }
     ),
-    "softening": _measure(
+    "softening": group(
         {
             _branch: _BRANCH,
             _brittleness: _BRITTLENESS,
@@ -502,7 +407,7 @@ MEASURES: dict[str, Measure] = {
             _rate: _RATE,
         }
     ),
-    "load": _measure({_load: _LOAD}),
-    "cost": _measure({_evaluations: _EVALUATIONS, _balances: _BALANCES}),
-    "field": _measure({_field: _FIELD, _field_in_band: _FIELD_IN_BAND}),
+    "load": LOAD,
+    "cost": COST,
+    "field": group({_field: _FIELD, _field_in_band: _FIELD_IN_BAND}),
 }

@@ -44,6 +44,8 @@ MEASURING = (
     "read/*.py",
     "measure/*.py",
     "study/measures.py",
+    "study/groups.py",
+    "study/loads.py",
     "study/expressions.py",
     "study/findings.py",
 )
