@@ -9,7 +9,7 @@ import numpy as np
 from ..measure.limit_load import limit_load
 from ..read.errors import RequestError
 from ..read.run import Run
-from .groups import Values, group, value_or
+from .parts import Values, measure_group, value_or
 from .types import Column, Missing, State
 
 _LOAD = {
@@ -71,5 +71,5 @@ def _balances(run: Run, state: State) -> Values:
     }
 
 
-LOAD = group({_load: _LOAD})
-COST = group({_evaluations: _EVALUATIONS, _balances: _BALANCES})
+LOAD = measure_group({_load: _LOAD})
+COST = measure_group({_evaluations: _EVALUATIONS, _balances: _BALANCES})

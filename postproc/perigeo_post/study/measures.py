@@ -25,17 +25,12 @@ from ..measure.quality import (
 from ..measure.softening import softening_branch, strain_rate
 from ..read.errors import FieldNotFoundError, RequestError
 from ..read.points import FloatArray
-from ..read.run import Frame, Run
-from .groups import Part, Values, group, value_or
+from ..read.run import Run
 from .loads import COST, LOAD
+from .parts import Part, Values, frame_of, measure_group, value_or
 from .types import Column, Measure, State
 
 STRAINS = {"0_5": 0.005, "1_0": 0.010, "1_5": 0.015}  # at which the stress is listed
-
-
-def frame_of(run: Run, state: State) -> Frame:
-    """The frame of a state: the nearest to its strain, or the last."""
-    return run.frame(state.strain)
 
 
 # ---- curve ---------------------------------------------------------------------------------
@@ -385,10 +380,12 @@ def _field_in_band(run: Run, state: State) -> Values:
 
 
 MEASURES: dict[str, Measure] = {
-    "curve": group({_curve: _CURVE, _curve_at_state: _AT_STATE, _frame_numbers: _FRAME}),
-    "modulus": group({_modulus(name): {name: about} for name, (about, _) in _MODULUS.items()}),
-    "band": group({_band: _BAND, _pattern: _PATTERN}),
-    "quality": group(
+    "curve": measure_group({_curve: _CURVE, _curve_at_state: _AT_STATE, _frame_numbers: _FRAME}),
+    "modulus": measure_group(
+        {_modulus(name): {name: about} for name, (about, _) in _MODULUS.items()}
+    ),
+    "band": measure_group({_band: _BAND, _pattern: _PATTERN}),
+    "quality": measure_group(
         {
             _kinetic: _KINETIC,
             _bound: _KINETIC_BOUND,
@@ -397,7 +394,7 @@ MEASURES: dict[str, Measure] = {
             _zero_energy: _ZERO_ENERGY,
         }
     ),
-    "softening": group(
+    "softening": measure_group(
         {
             _branch: _BRANCH,
             _brittleness: _BRITTLENESS,
@@ -409,5 +406,5 @@ MEASURES: dict[str, Measure] = {
     ),
     "load": LOAD,
     "cost": COST,
-    "field": group({_field: _FIELD, _field_in_band: _FIELD_IN_BAND}),
+    "field": measure_group({_field: _FIELD, _field_in_band: _FIELD_IN_BAND}),
 }

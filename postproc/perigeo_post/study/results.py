@@ -44,7 +44,7 @@ MEASURING = (
     "read/*.py",
     "measure/*.py",
     "study/measures.py",
-    "study/groups.py",
+    "study/parts.py",
     "study/loads.py",
     "study/expressions.py",
     "study/findings.py",

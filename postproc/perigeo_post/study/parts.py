@@ -1,4 +1,4 @@
-"""How a group of columns is measured: each part may fail by itself, with a reason."""
+"""What the groups of columns of a study are made of: parts that may fail each by itself."""
 
 from __future__ import annotations
 
@@ -8,14 +8,14 @@ from typing import Union
 import numpy as np
 
 from ..read.errors import PostError
-from ..read.run import Run
+from ..read.run import Frame, Run
 from .types import Column, Measure, Missing, State, Value
 
 Values = dict[str, Union[Value, Missing]]
 Part = Callable[[Run, State], Values]
 
 
-def group(parts: Mapping[Part, Mapping[str, Column]]) -> Measure:
+def measure_group(parts: Mapping[Part, Mapping[str, Column]]) -> Measure:
     """A group of columns: what gives values, each with its columns, may fail by itself."""
 
     def take(run: Run, state: State) -> Values:
@@ -27,13 +27,13 @@ def group(parts: Mapping[Part, Mapping[str, Column]]) -> Measure:
                 reason = str(error) if isinstance(error, PostError) else type(error).__name__
                 found.update(dict.fromkeys(columns, Missing(reason)))
             else:
-                found.update({name: plain(values[name]) for name in columns})
+                found.update({name: plain_value(values[name]) for name in columns})
         return found
 
     return Measure({k: v for columns in parts.values() for k, v in columns.items()}, take)
 
 
-def plain(value: Value | Missing) -> Value | Missing:
+def plain_value(value: Value | Missing) -> Value | Missing:
     """Python's own numbers, a reason for what is not finite."""
     if isinstance(value, (bool, str, int, Missing)):
         return value
@@ -43,5 +43,10 @@ def plain(value: Value | Missing) -> Value | Missing:
 
 def value_or(value: Value, reason: str) -> Value | Missing:
     """A value; the reason where it is none or not finite."""
-    found = plain(value)
+    found = plain_value(value)
     return Missing(reason) if isinstance(found, Missing) else found
+
+
+def frame_of(run: Run, state: State) -> Frame:
+    """The frame of a state: the nearest to its strain, or the last."""
+    return run.frame(state.strain)
