@@ -50,7 +50,7 @@ build    := build/$(BUILD)
 .SUFFIXES:
 .DELETE_ON_ERROR:
 studies := fig3a fig3b fig4 fig5 seeds horizon loading size softening influence heterogeneity \
-  zero_energy
+  zero_energy equilibrium
 .PHONY: all program objects post debug units demo demo-quick test lint verify \
   layers setup install help clean distclean figures $(studies) \
   report report-view site bench clouds
@@ -91,7 +91,9 @@ softening:         ## study: kinds of softening, its modulus, the residual stren
 influence:         ## study: influence functions
 heterogeneity:     ## study: soil whose strength varies from place to place
 zero_energy:       ## study: controls of zero-energy modes: noise, bands, limit load
-figures: asked = $(studies)
+equilibrium:       ## studies: motion or equilibrium after the peak, limit load of a footing
+equilibrium: asked = equilibrium footing
+figures: asked = $(studies) footing
 figures $(studies):
 	@sh tools/setup.sh run
 	@$(submake) $(parallel) program

@@ -300,6 +300,7 @@ a.nml: the input is right
 
 def test_the_figures_of_a_check_are_read() -> None:
     assert read_check(CHECKED) == Check(5559, 9154, 1.2345e7, 150.0)
+    assert read_check(CHECKED.replace("steps  ", "increments")) == read_check(CHECKED)
     assert read_check("nothing") is None
     assert weight(Check(100, 10, 1000.0, 0.0)) == pytest.approx(40000.0)
 

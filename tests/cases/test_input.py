@@ -346,6 +346,16 @@ def test_what_is_absent_is_the_control_that_lets_go(perigeo, tmp_path):
     assert "method = 'relaxing'" in printed.stdout
 
 
+def test_an_input_of_equilibrium_printed_reads_back(perigeo, tmp_path):
+    source = ROOT / "input" / "limit_loads" / "strip_footing.nml"
+    options = ["--set", "integration.method=equilibrium", "--set", "integration.damping="]
+    printed = perigeo(["--print-input", *options, source], tmp_path)
+    assert printed.returncode == 0, printed.stderr
+    (tmp_path / "run.nml").write_text(printed.stdout)
+    again = perigeo(["--print-input", "run.nml"], tmp_path)
+    assert again.stdout == printed.stdout, again.stderr
+
+
 def test_a_run_with_settings_stores_them_beside_the_file(run_case, tmp_path):
     done = run_case(VALID, tmp_path, "--set", "material.density=1800", "--quiet")
     assert done.returncode == 0, done.stderr

@@ -101,6 +101,31 @@ def _history_text(history: dict[str, Any]) -> list[str]:
         text = f"{modulus / 1e6:.2f} MPa" if modulus is not None else "not determined: "
         reason = history.get("apparent_modulus_missing", "")
         lines.append(f"  E_app        {text}{reason}")
+    lines += _loads_text(history.get("limit_loads", []))
     if "largest_energy_error" in history:
         lines.append(f"  energy error {history['largest_energy_error']:.2e} at most")
     return lines
+
+
+def _loads_text(loads: list[dict[str, Any]]) -> list[str]:
+    """Whether the forces of boundaries that move have settled, and their peaks."""
+    lines = []
+    for one in loads:
+        way = f"the last fifth of {one['way']:.4g} m"
+        if one["missing"]:
+            words = f"not known: {one['missing']}"
+        elif one["reached"]:
+            words = f"{_force(one['load'])}; it changes by {one['change']:.2%} over {way}"
+        else:
+            words = f"no limit load yet: the force changes by {one['change']:.2%} over {way}"
+        lines.append(f"  limit load   {one['boundary']}: {words}")
+        strain = one["strain_at_peak"]
+        at = f"{one['time_at_peak']:.4g} s" + (
+            f", a strain of {strain:.6f}" if np.isfinite(strain) else ""
+        )
+        lines.append(f"               its largest force is {_force(one['peak'])} at {at}")
+    return lines
+
+
+def _force(value: float) -> str:
+    return f"{value / 1e3:.3f} kN/m"

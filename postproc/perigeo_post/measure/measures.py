@@ -24,6 +24,7 @@ from .band import (
 from .band_fit import fitted_width
 from .band_search import find_bands, search_scale
 from .curves import curve_numbers, modulus_numbers, peak, stress_strain
+from .limit_load import limit_loads
 from .sampling import interpolate
 
 
@@ -259,6 +260,8 @@ def _history_facts(run: Run) -> dict[str, Any]:
             facts.update({k: v for k, v in curve_numbers(run).items() if k not in ("run", "file")})
         except FieldNotFoundError as error:
             facts["curve_missing"] = str(error)
+    if "time" in history:
+        facts["limit_loads"] = [asdict(one) for one in limit_loads(run)]
     if "energy_error" in history and history.rows:
         facts["largest_energy_error"] = float(np.nanmax(np.abs(history["energy_error"])))
     return facts

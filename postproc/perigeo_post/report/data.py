@@ -49,7 +49,7 @@ __all__ = [
 # The order of the paper; other studies follow by name.
 ORDER = (
     "fig3a", "fig3b", "fig4", "fig5", "seeds", "horizon", "loading", "size", "softening",
-    "influence", "heterogeneity",
+    "influence", "heterogeneity", "zero_energy", "equilibrium", "footing",
 )  # fmt: skip
 
 

@@ -21,10 +21,10 @@ _NOISE = {
 _SHARE = {
     "control_share": Column("1", "work of the control over all work, at the end"),
 }
-_LOAD = {
-    "load_mean": Column("N/m", "load of the boundary with a span, from 0.4 of its motion on"),
-    "load_end": Column("N/m", "the same at the end"),
-    "load_energy_error": Column("1", "largest error of the energy balance of this run"),
+_PUSH = {
+    "push_mean": Column("N/m", "load of the boundary with a span, from 0.4 of its motion on"),
+    "push_end": Column("N/m", "the same at the end"),
+    "push_energy_error": Column("1", "largest error of the energy balance of this run"),
 }
 
 
@@ -47,11 +47,11 @@ def _share(run: Run, state: State) -> Values:
     }
 
 
-def _load(run: Run, state: State) -> Values:
+def _push(run: Run, state: State) -> Values:
     found = push_load(run)
     error = float(np.nanmax(np.abs(run.history()["energy_error"])))
-    return {"load_mean": found.mean, "load_end": found.end, "load_energy_error": error}
+    return {"push_mean": found.mean, "push_end": found.end, "push_energy_error": error}
 
 
 CONTROL = measure_group({_noise: _NOISE, _share: _SHARE})
-LOAD = measure_group({_load: _LOAD})
+PUSH = measure_group({_push: _PUSH})

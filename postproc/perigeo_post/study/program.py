@@ -87,7 +87,7 @@ def read_check(text: str) -> Check | None:
         match = re.search(rf"^  {pattern}", text, re.MULTILINE)
         return match.group(1) if match else None
 
-    points, steps = first(r"points +(\d+)"), first(r"steps +(\d+)")
+    points, steps = first(r"points +(\d+)"), first(r"(?:steps|increments) +(\d+)")
     if points is None or steps is None:
         return None
     bonds = first(r"bonds +([\d.Ee+]+)")

@@ -47,6 +47,7 @@ MEASURING = (
     "study/measures.py",
     "study/growth.py",
     "study/control.py",
+    "study/loads.py",
     "study/expressions.py",
     "study/findings.py",
 )
