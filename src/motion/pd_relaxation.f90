@@ -175,7 +175,7 @@ contains
   subroutine follow_flow(k, model)
     integer,       intent(in)    :: k
     type(model_t), intent(inout) :: model
-    real(wp), parameter :: first = 1.0e-2_wp
+    real(wp), parameter :: first = 1.0e-3_wp
 
     if (.not. allocated(model%operators%relaxing)) return
     call model%operators%relaxing%follow( &
@@ -305,6 +305,10 @@ contains
     real(wp) :: push
     integer  :: i, c
 
+    if (move%c <= 0.0_wp .and. move%against <= 0.0_wp .and. move%back <= 0.0_wp) then
+      call glide_rows(lo, hi, move%a, move%b, free, state, relaxation)
+      return
+    end if
     associate (u => state%displacement, f => state%force, w => relaxation%move, &
       m => relaxation%kept, before => relaxation%force_before, s => relaxation%step)
       do c = 1, 2
@@ -323,5 +327,28 @@ contains
       end do
     end associate
   end subroutine move_rows
+
+  !> The same where m is the move.
+  pure subroutine glide_rows(lo, hi, a, b, free, state, relaxation)
+    integer,            intent(in)    :: lo, hi
+    real(wp),           intent(in)    :: a, b
+    real(wp), intent(in), contiguous  :: free(:, :)
+    type(state_t),      intent(inout) :: state
+    type(relaxation_t), intent(inout) :: relaxation
+    integer :: i, c
+
+    associate (u => state%displacement, f => state%force, w => relaxation%move, &
+      m => relaxation%kept, before => relaxation%force_before, s => relaxation%step)
+      do c = 1, 2
+        !$omp simd simdlen(8)
+        do i = lo, hi
+          m(i, c) = a * m(i, c) + b * s(i) * free(i, c) * f(i, c)
+          w(i, c) = m(i, c)
+          u(i, c) = u(i, c) + m(i, c)
+          before(i, c) = f(i, c)
+        end do
+      end do
+    end associate
+  end subroutine glide_rows
 
 end module pd_relaxation
