@@ -116,7 +116,8 @@ contains
     real(wp) :: lacking
     logical  :: first
 
-    first = run%clock%step <= first_steps .and. .not. run%schedule%is_over(run%clock)
+    first = run%clock%step <= first_steps .and. .not. run%schedule%is_over(run%clock) &
+      .and. .not. run%model%at_equilibrium
     if (first .and. run%clock%step == 1) return
     lacking = imbalance(run%record%seen, run%ledger)
     if (first .and. lacking <= 1.0_wp) return
@@ -148,7 +149,8 @@ contains
     run%control_doubted = .true.
     call record_line(run%record, 'warning: the control of zero-energy modes has '// &
       short_number(100.0_wp * part)//' % of the work at step '//integer_text(run%clock%step)// &
-      '; above 1 % it carries load that the material may not: a weaker control is due', errors)
+      '; above 1 % it carries load that the material may not: a weaker control '// &
+      'is due (&stabilisation factor, relaxing_strain)', errors)
   end subroutine look_at_control
 
   !> Forces that are not in balance where they are meant to be: told once.
@@ -168,10 +170,11 @@ contains
     end if
     if (run%balance_doubted) return
     if (run%model%at_equilibrium) then
-      if (run%increments%unfinished == 0) return
+      if (run%increments%unfinished%step == 0) return
       call record_line(run%record, 'warning: an increment was taken that is not at rest: the '// &
-        'unbalanced force at step '//integer_text(run%clock%step)//' is '// &
-        short_number(run%increments%last%residual)//' of the reactions and loads', errors)
+        'unbalanced force at step '//integer_text(run%increments%unfinished%step)//' is '// &
+        short_number(run%increments%unfinished%number)//' of the reactions and loads; '// &
+        remedy(run)//', or a control of zero-energy modes, may help', errors)
     else
       part = run%record%seen%value('damping_share')
       if (.not. part > most .or. run%clock%time() < at_first * run%schedule%end_time) return
@@ -190,10 +193,10 @@ contains
     real(wp), parameter :: sizeable = 1.0e-2_wp   ! of all work
 
     if (run%jump_told) return
-    if (over_work(run%increments%released, run%ledger) <= sizeable) return
+    if (over_work(run%increments%jump%number, run%ledger) <= sizeable) return
     run%jump_told = .true.
-    call record_line(run%record, 'a jump at step '//integer_text(run%clock%step)// &
-      ': no equilibrium was near, and '//short_number(run%increments%released)// &
+    call record_line(run%record, 'a jump at step '//integer_text(run%increments%jump%step)// &
+      ': no equilibrium was near, and '//short_number(run%increments%jump%number)// &
       ' J/m were set free on the way to the next one (damping_dissipation)', errors)
   end subroutine tell_of_jump
 

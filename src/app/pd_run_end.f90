@@ -17,7 +17,7 @@ module pd_run_end
 contains
 
   !> No equilibrium was found. Under loads that is their limit: the last equilibrium is written, and
-  !> the run is finished. Without loads it is a failure.
+  !> the run is finished. Without loads, or from the start, it is a failure.
   subroutine end_without_equilibrium(run, outcome)
     type(run_t),     intent(inout) :: run
     type(outcome_t), intent(inout) :: outcome
@@ -29,7 +29,8 @@ contains
       tried = short_number(t + run%clock%time_step)//' s, where the unbalanced force is '// &
         short_number(last%residual)//' of reactions and loads after '// &
         integer_text(last%moves)//' moves'
-      if (.not. run%increments%under_load) then
+      if (run%clock%step == 0) tried = tried//'; is the body held, and the first load below its limit?'
+      if (.not. run%increments%under_load .or. run%clock%step == 0) then
         row = last%failed_row
         if (row == 0) row = fastest_row(run)
         call fail('no equilibrium was found at '//tried, row, run, outcome)

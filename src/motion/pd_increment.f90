@@ -20,11 +20,19 @@ module pd_increment
   use pd_schedule, only: schedule_t
   use pd_state, only: state_t
   use pd_timing, only: timing_t
-  use pd_unbalanced, only: loads_at
+  use pd_unbalanced, only: find_loads, loads_at
   implicit none
   private
 
   public :: increments_t, new_increments, take_increment
+
+  !> A number of an increment that stands out.
+  type :: moment_t
+    integer  :: step = 0               !! 0: none
+    real(wp) :: number = 0.0_wp
+  contains
+    procedure :: see
+  end type moment_t
 
   !> How increments follow each other.
   type :: increments_t
@@ -32,8 +40,8 @@ module pd_increment
     real(wp) :: shortest = 0.0_wp      !! [s]
     type(relaxation_t) :: relaxation
     type(relaxed_t)    :: last         !! what came of the last one
-    integer :: unfinished = 0          !! increments that were taken without being at rest
-    real(wp) :: released = 0.0_wp      !! energy that the last one has set free [J/m]
+    type(moment_t) :: unfinished       !! residual of the worst one that was taken without rest
+    type(moment_t) :: jump             !! energy of the one that has set free most [J/m]
     logical :: lost = .false.          !! the last one did not come to rest, and was not taken
     logical :: under_load = .false.    !! loads grow in the last one
   end type increments_t
@@ -97,10 +105,10 @@ contains
         return
       end if
       call clock%advance()
-      if (.not. last%at_rest) increments%unfinished = increments%unfinished + 1
+      if (.not. last%at_rest) call increments%unfinished%see(clock%step, last%residual)
       call settle(model, t, clock%time_step, relaxation, state, timing)
     end associate
-    call enter_work(t, clock%time_step, model, state, increments, ledger)
+    call enter_work(t, clock, model, state, increments, ledger)
     call choose_next(schedule, increments, clock)
   end subroutine take_increment
 
@@ -131,31 +139,66 @@ contains
   end subroutine settle
 
   !> Work of the increment. That of supports and loads follows from the forces at both ends; what
-  !> the forces have done on the way beyond that has left the body.
-  subroutine enter_work(t, duration, model, state, increments, ledger)
-    real(wp),           intent(in)    :: t, duration   !! [s]
+  !> the forces have done on the way beyond that has left the body. On the way loads are those of
+  !> the end, from the guess on, while those that grow do less.
+  subroutine enter_work(t, clock, model, state, increments, ledger)
+    real(wp),           intent(in)    :: t             !! its start [s]
+    type(clock_t),      intent(in)    :: clock         !! at its end
     type(model_t),      intent(in)    :: model
     type(state_t),      intent(in)    :: state
     type(increments_t), intent(inout) :: increments
     type(ledger_t),     intent(inout) :: ledger
-    real(wp) :: work, held
+    real(wp) :: work, beyond
     integer  :: k
 
-    held = 0.0_wp
+    beyond = -ahead_of_loads(t, clock%time_step, model, state, increments%relaxation)
     do k = 1, size(model%supports%items)
       associate (support => model%supports%items(k)%support)
-        work = support%work(state%velocity, t, t + duration)
+        work = support%work(state%velocity, t, t + clock%time_step)
         ledger%outer_work = ledger%outer_work + work
-        if (.not. allocated(support%load_kind)) held = held + work   ! loads are in the net forces
+        if (.not. allocated(support%load_kind)) beyond = beyond + work   ! loads are in the net forces
       end associate
     end do
-    ledger%outer_work = ledger%outer_work + model%loads%work(state%velocity, t, t + duration)
+    ledger%outer_work = ledger%outer_work + model%loads%work(state%velocity, t, t + clock%time_step)
     ledger%damping = ledger%damping + increments%last%work
-    ledger%damping(1) = ledger%damping(1) + held
-    increments%released = model%blocks%total(increments%last%work) + held
+    ledger%damping(1) = ledger%damping(1) + beyond
+    call increments%jump%see(clock%step, model%blocks%total(increments%last%work) + beyond)
     ledger%plastic = ledger%plastic + increments%relaxation%blocks%dissipated
     ledger%control = ledger%control + increments%relaxation%blocks%relaxed
   end subroutine enter_work
+
+  !> Work of the loads of the end on the way from the guess, beyond that of loads that grow evenly:
+  !> half of what they have grown by, on this way [J/m].
+  real(wp) function ahead_of_loads(t, duration, model, state, relaxation) result(work)
+    real(wp),           intent(in) :: t, duration   !! [s]
+    type(model_t),      intent(in) :: model
+    type(state_t),      intent(in) :: state
+    type(relaxation_t), intent(in) :: relaxation
+    real(wp), allocatable :: before(:, :), load(:, :)
+    real(wp) :: parts(model%blocks%count)
+    integer  :: block
+
+    call find_loads(model, t, before)
+    call find_loads(model, t + duration, load)
+    load = 0.5_wp * (load - before) * (state%displacement - relaxation%guess)
+    do block = 1, model%blocks%count
+      associate (lo => model%blocks%lo(block), hi => model%blocks%hi(block))
+        parts(block) = sum(model%points%volume(lo:hi) * (load(lo:hi, 1) + load(lo:hi, 2)))
+      end associate
+    end do
+    work = model%blocks%total(parts)
+  end function ahead_of_loads
+
+  !> Remember the largest number so far.
+  pure subroutine see(self, step, number)
+    class(moment_t), intent(inout) :: self
+    integer,         intent(in)    :: step
+    real(wp),        intent(in)    :: number
+
+    if (number <= self%number) return
+    self%step = step
+    self%number = number
+  end subroutine see
 
   !> Length of the next increment: a part of the time to the next frame, or to the end.
   subroutine choose_next(schedule, increments, clock)

@@ -47,6 +47,7 @@ module pd_relaxation
     real(wp), allocatable, private :: sums(:, :)            !! of the blocks
     ! state at the start of the increment
     real(wp), allocatable :: displacement(:, :)             !! (n,2) [m]
+    real(wp), allocatable :: guess(:, :)                    !! displacement to begin with (n,2) [m]
     real(wp), allocatable, private :: stress(:, :), history(:, :)
     real(wp), allocatable, private :: control_memory(:, :), start_force(:, :)
   end type relaxation_t
@@ -103,7 +104,7 @@ contains
   pure integer function numbers_per_row(state) result(numbers)
     type(state_t), intent(in) :: state   !! whose columns of the history are known
 
-    numbers = 1 + 3 * 2 + 2 + 4 + size(state%remembered) + 4 + 2
+    numbers = 1 + 3 * 2 + 2 + 2 + 4 + size(state%remembered) + 4 + 2
   end function numbers_per_row
 
   !> Remember the state at the start of an increment.
@@ -144,6 +145,7 @@ contains
 
     loads = loads_at(model, t)
     relaxation%kept = 0.0_wp
+    relaxation%guess = state%displacement
     relaxation%move = state%displacement - relaxation%displacement
     relaxation%force_before = relaxation%start_force
     allocate (relaxed%work(model%blocks%count), source=0.0_wp)

@@ -13,7 +13,7 @@ module pd_unbalanced
   implicit none
   private
 
-  public :: unbalanced_t, look_at_forces, loads_at, over
+  public :: unbalanced_t, look_at_forces, find_loads, loads_at, over
 
   !> Sums over all points [N/m].
   type :: unbalanced_t
@@ -74,23 +74,35 @@ contains
     sums = [block_sum(terms(:, 1)), block_sum(terms(:, 2)), block_sum(terms(:, 3))]
   end function sums_of_block
 
+  !> Force density of the loads at time t, those on supports included.
+  subroutine find_loads(model, t, load)
+    type(model_t),         intent(in)  :: model
+    real(wp),              intent(in)  :: t            !! [s]
+    real(wp), allocatable, intent(out) :: load(:, :)   !! (n,2) [N/m^3]
+    real(wp) :: applied(2)
+    integer  :: k, c
+
+    allocate (load(size(model%points%volume), 2), source=0.0_wp)
+    call model%loads%add_forces(model%points%volume, t, load)
+    do k = 1, size(model%supports%items)
+      associate (support => model%supports%items(k)%support)
+        applied = support%applied(t)
+        do c = 1, 2
+          if (abs(applied(c)) > 0.0_wp) load(support%points, c) = load(support%points, c) &
+            + applied(c) / sum(model%points%volume(support%points))
+        end do
+      end associate
+    end do
+  end subroutine find_loads
+
   !> Sum of the loads at time t, those on supports included [N/m].
   real(wp) function loads_at(model, t) result(sum_of_loads)
     type(model_t), intent(in) :: model
     real(wp),      intent(in) :: t   !! [s]
     real(wp), allocatable :: load(:, :)
-    real(wp) :: applied(2)
-    integer  :: k
 
-    sum_of_loads = 0.0_wp
-    do k = 1, size(model%supports%items)
-      applied = model%supports%items(k)%support%applied(t)
-      sum_of_loads = sum_of_loads + sum(abs(applied))
-    end do
-    if (size(model%loads%items) == 0) return
-    allocate (load(size(model%points%volume), 2), source=0.0_wp)
-    call model%loads%add_forces(model%points%volume, t, load)
-    sum_of_loads = sum_of_loads + sum_of_absolute(model%blocks, model%points%volume, load)
+    call find_loads(model, t, load)
+    sum_of_loads = sum_of_absolute(model%blocks, model%points%volume, load)
   end function loads_at
 
   !> sum V (|f_x| + |f_y|), block by block: the same bits for any number of threads.

@@ -99,9 +99,23 @@ def test_the_limit_of_a_load_ends_the_run(run_case, tmp_path):
     log = (tmp_path / "out" / "case.log").read_text()
     assert "limit load: the last equilibrium is at" in log
     run = history(tmp_path / "out" / "case_history.csv")
+    elastic = run["max_plastic_strain"] == 0.0
+    assert np.abs(run["energy_error"][elastic]).max() < 1e-10
+    assert np.abs(run["damping_dissipation"][elastic]).max() < 1e-3 * run["external_work"].max()
+    assert np.abs(run["energy_error"]).max() < 5e-3
     limit = 2.0 * YIELD / np.sqrt(3.0) * (1.0 + 0.1 / WIDTH)
     assert run["bottom_force_y"][-1] / WIDTH == pytest.approx(limit, rel=0.03)
     assert run["step"][-1] != run["step"][-2]
+
+
+def test_a_body_that_is_not_held_fails(run_case, tmp_path):
+    text = CLAY.replace("velocity = 0.0, -0.01", "velocity = 0.0, 0.0")
+    text = changed(text, final_strain="1.0").replace("final_strain", "end_time")
+    text = text.replace("frame_strains = 0.004, 0.01", "frame_count = 1")
+    text += "&pressure name = 'cell', side = 'left', value = 1.0e4, ramp_time = 1.0 /\n"
+    done = run_case(text, tmp_path, "--quiet", "--threads", "1")
+    assert done.returncode == 4
+    assert "is the body held" in done.stderr
 
 
 def test_a_jump_is_followed_and_told(run_case, tmp_path):
