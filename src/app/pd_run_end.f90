@@ -29,7 +29,8 @@ contains
       tried = short_number(t + run%clock%time_step)//' s, where the unbalanced force is '// &
         short_number(last%residual)//' of reactions and loads after '// &
         integer_text(last%moves)//' moves'
-      if (run%clock%step == 0) tried = tried//'; is the body held, and the first load below its limit?'
+      if (run%clock%step == 0) tried = tried//'; is the body held, and the first load below '// &
+        'its limit?'
       if (.not. run%increments%under_load .or. run%clock%step == 0) then
         row = last%failed_row
         if (row == 0) row = fastest_row(run)

@@ -156,7 +156,8 @@ contains
       associate (support => model%supports%items(k)%support)
         work = support%work(state%velocity, t, t + clock%time_step)
         ledger%outer_work = ledger%outer_work + work
-        if (.not. allocated(support%load_kind)) beyond = beyond + work   ! loads are in the net forces
+        ! loads are in the net forces already
+        if (.not. allocated(support%load_kind)) beyond = beyond + work
       end associate
     end do
     ledger%outer_work = ledger%outer_work + model%loads%work(state%velocity, t, t + clock%time_step)
