@@ -27,7 +27,11 @@ SHEAR = 1.0e-3
 CONTROLS: dict[str, dict[str, object]] = {
     "none": {"method": "none"},
     "silling, 0.0125": {"method": "silling", "factor": 0.0125},
-    "relaxing": {"method": "relaxing"},
+    "relaxing, 0.5, 1e-4": {
+        "method": "relaxing",
+        "relaxing_stiffness": 0.5,
+        "relaxing_strain": 1.0e-4,
+    },
 }
 
 
@@ -166,6 +170,7 @@ def cost(n: int, weights: str) -> tuple[float, float, float]:
     cloud(RESULTS / name / "points.txt", n, 2 * n, (0, 3), 0.2)
     end = ("integration", {"end_time": 1.0e-3, "time_step_rule": "courant"})
     groups = [*specimen(n, 0.2, weights), verify.material("elastic"), end]
+    groups.append(("stabilisation", CONTROLS["none"]))
     path = write(name, groups)
     best = np.inf
     for _ in range(3):

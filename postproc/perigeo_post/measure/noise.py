@@ -1,4 +1,4 @@
-"""Noise of the displacement, and the load of a boundary that is pushed into a body.
+"""Noise of the displacement.
 
 Zero-energy modes alternate from point to point, so a fourth difference shows them and hardly sees
 the smooth part: u_{-2} - 4 u_{-1} + 6 u_0 - 4 u_1 + u_2 is 16 a for a field that alternates with
@@ -16,10 +16,9 @@ import numpy as np
 
 from ..read.errors import RequestError
 from ..read.points import BoolArray, FloatArray
-from ..read.run import Frame, Run
+from ..read.run import Frame
 
 FLOWS = 1.0e-6  # equivalent plastic strain from which on a point has flowed
-SETTLED = 0.4  # part of a push from which on its load is averaged
 
 
 @dataclass(frozen=True)
@@ -84,25 +83,3 @@ def _rms(values: FloatArray) -> float:
     """Root mean square of the finite values; NaN where there are none."""
     good = values[np.isfinite(values)]
     return float(np.sqrt(np.mean(good**2))) if len(good) else float("nan")
-
-
-@dataclass(frozen=True)
-class PushLoad:
-    """Load of a pushed boundary [N/m]."""
-
-    mean: float  # from 0.4 of its motion on
-    end: float
-
-
-def push_load(run: Run) -> PushLoad:
-    """The normal force of the boundary on a part of a side (`span`), while it is pushed evenly."""
-    spans = {name: run.value(f"boundary({name}).span") for name in run.boundary_names}
-    pushed = [name for name, span in spans.items() if span not in (None, "none")]
-    if len(pushed) != 1:
-        raise RequestError(f"{run.path} has no single boundary on a part of a side")
-    name = pushed[0]
-    side = (run.value(f"boundary({name}).side") or "").strip("'\" ")
-    history = run.history()
-    load = np.abs(history[f"{name}_force_{'y' if side in ('top', 'bottom') else 'x'}"])
-    time = history["time"]
-    return PushLoad(float(load[time >= SETTLED * time[-1]].mean()), float(load[-1]))

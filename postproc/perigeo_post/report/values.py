@@ -22,7 +22,7 @@ HEADLINE = (
     "softening_slope", "brittleness", "dissipated_energy",
     "yield_stress_variation", "kinetic_ratio_largest", "reaction_gap_largest",
     "energy_error_largest", "noise_outside", "noise_inside", "zero_energy_outside",
-    "control_share", "push_mean", "load_end",
+    "control_share", "limit_load", "stress_1_0", "force_evaluations",
 )  # fmt: skip
 ENOUGH = 16  # up to so many quantities all are shown
 # How good a run is: small numbers.

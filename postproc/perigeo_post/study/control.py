@@ -1,10 +1,8 @@
-"""Measures of the control of zero-energy modes, and of the load that it may carry."""
+"""Measures of the control of zero-energy modes."""
 
 from __future__ import annotations
 
-import numpy as np
-
-from ..measure.noise import noise_of, push_load
+from ..measure.noise import noise_of
 from ..read.run import Run
 from .parts import Values, frame_of, measure_group, value_or
 from .types import Column, State
@@ -20,11 +18,6 @@ _NOISE = {
 }
 _SHARE = {
     "control_share": Column("1", "work of the control over all work, at the end"),
-}
-_PUSH = {
-    "push_mean": Column("N/m", "load of the boundary with a span, from 0.4 of its motion on"),
-    "push_end": Column("N/m", "the same at the end"),
-    "push_energy_error": Column("1", "largest error of the energy balance of this run"),
 }
 
 
@@ -47,11 +40,4 @@ def _share(run: Run, state: State) -> Values:
     }
 
 
-def _push(run: Run, state: State) -> Values:
-    found = push_load(run)
-    error = float(np.nanmax(np.abs(run.history()["energy_error"])))
-    return {"push_mean": found.mean, "push_end": found.end, "push_energy_error": error}
-
-
 CONTROL = measure_group({_noise: _NOISE, _share: _SHARE})
-PUSH = measure_group({_push: _PUSH})

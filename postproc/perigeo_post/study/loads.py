@@ -55,11 +55,12 @@ def _evaluations(run: Run, state: State) -> Values:
         text = log.read_text(encoding="utf-8", errors="replace")
     except OSError:
         raise RequestError(f"there is no log {log}, which tells the evaluations") from None
-    found = re.findall(r"evaluations of the forces +(\d+)", text)
-    whole = re.findall(r"^time loop .*, steps +(\d+)", text, re.MULTILINE)
-    if not found or int(whole[-1]) != int(run.history()["step"][-1]):
+    found = re.findall(
+        r"^time loop .*, steps +(\d+), evaluations of the forces +(\d+)", text, re.MULTILINE
+    )
+    if not found or int(found[-1][0]) != int(run.history()["step"][-1]):
         raise RequestError(f"the log {log} does not tell the evaluations of the whole run")
-    return {"force_evaluations": int(found[-1])}
+    return {"force_evaluations": int(found[-1][1])}
 
 
 def _balances(run: Run, state: State) -> Values:

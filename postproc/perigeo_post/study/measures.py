@@ -31,7 +31,7 @@ from ..measure.softening import softening_branch, strain_rate
 from ..read.errors import FieldNotFoundError, RequestError
 from ..read.points import FloatArray
 from ..read.run import Run
-from .control import CONTROL, PUSH
+from .control import CONTROL
 from .growth import CHANGE, START
 from .loads import COST, LOAD
 from .parts import Part, Values, frame_of, measure_group, value_or
@@ -414,7 +414,6 @@ MEASURES: dict[str, Measure] = {
     "start": START,
     "change": CHANGE,
     "control": CONTROL,
-    "push": PUSH,
     "load": LOAD,
     "cost": COST,
     "field": measure_group({_field: _FIELD, _field_in_band: _FIELD_IN_BAND}),
