@@ -24,6 +24,9 @@ module pd_geometry
                                                 !! allocated: no lattice
     real(wp) :: lower(2) = 0.0_wp               !! corners of the extent of the body without
     real(wp) :: upper(2) = 0.0_wp               !! fictitious points, as used [m]
+    logical,  allocatable :: filled(:, :)       !! square above and right of the lattice line at a
+                                                !! place is material, layers included (columns,
+                                                !! rows of places, with a margin); not for a cloud
     type(side_t) :: sides(side_count)           !! by number (`pd_sides`); not for a cloud
   end type body_t
 
@@ -102,6 +105,7 @@ contains
     call number_points(places, origin, lattice, body)
     call find_parts(places, counts, lattice, body)
     call find_sides(places, origin, counts, lattice, body)
+    call move_alloc(places%filled, body%filled)
   end subroutine lattice_body
 
   !> Mark the points and the squares of the rectangles.
