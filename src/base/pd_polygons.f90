@@ -170,7 +170,8 @@ contains
 
   end function meet
 
-  !> Polygon of n vertices that has the area of a circle; the first one in direction of x.
+  !> Polygon of n vertices that has the area of a circle. For n a multiple of 4 edges, not vertices,
+  !> lie towards the axes: the polygon stays within the box around the circle.
   pure function polygon_of_circle(centre, radius, n) result(vertices)
     real(wp), intent(in) :: centre(2), radius
     integer,  intent(in) :: n
@@ -181,7 +182,8 @@ contains
     angle = whole / real(n, wp)
     r = radius * sqrt(angle / sin(angle))
     do k = 1, n
-      vertices(:, k) = centre + r * [cos(real(k - 1, wp) * angle), sin(real(k - 1, wp) * angle)]
+      vertices(:, k) = centre + r * [cos((real(k, wp) - 0.5_wp) * angle), &
+        sin((real(k, wp) - 0.5_wp) * angle)]
     end do
   end function polygon_of_circle
 

@@ -108,7 +108,7 @@ contains
     end do
     do k = 1, size(layers)
       if (.not. any(places%owner == layers(k)%boundary)) &
-        call errors%add('a boundary holds no point', place_of_layer(layers(k)))
+        call errors%add('a boundary holds no point', place_of_layer(shapes, layers(k)))
     end do
     call join_layers(lattice, places)
     call number_points(places, corner, lattice, body)
@@ -128,34 +128,39 @@ contains
     do k = 1, size(places%shapes)
       if (places%shapes(k)%solid) then
         if (.not. any(places%part == k)) call errors%add('a body leaves no point', &
-          place_of_body(k), 'later bodies cover it, or it lies between the places of the lattice', &
+          place_of_body(places%shapes, k), 'later bodies cover it, or it lies between the places of the lattice', &
           'at least one point of its own')
       else
         box(:, 1) = minval(places%shapes(k)%vertices, 2)
         box(:, 2) = maxval(places%shapes(k)%vertices, 2)
         if (area_within(places%shapes(:k - 1), box(:, 1), box(:, 2)) &
           - area_within(places%shapes(:k), box(:, 1), box(:, 2)) <= hardly) call errors%add( &
-          'a hole takes nothing away', place_of_body(k), 'no solid before it lies there', &
+          'a hole takes nothing away', place_of_body(places%shapes, k), 'no solid before it lies there', &
           'a hole in one of the bodies before it')
       end if
     end do
   end subroutine look_at_shapes
 
-  function place_of_body(k) result(place)
-    integer, intent(in) :: k
+  function place_of_body(shapes, k) result(place)
+    type(shape_t), intent(in) :: shapes(:)
+    integer,       intent(in) :: k
     character(:), allocatable :: place
 
     place = '&body number '//integer_text(k)
+    if (.not. allocated(shapes(k)%name)) return
+    if (shapes(k)%name /= '') place = place//', '''//shapes(k)%name//''''
   end function place_of_body
 
-  function place_of_layer(layer) result(place)
+  function place_of_layer(shapes, layer) result(place)
+    type(shape_t), intent(in) :: shapes(:)
     type(layer_t), intent(in) :: layer
     character(:), allocatable :: place
 
     if (layer%shape == 0) then
       place = '&boundary side = '//layer%side
     else
-      place = '&boundary number '//integer_text(layer%boundary)//', '//place_of_body(layer%shape)
+      place = '&boundary number '//integer_text(layer%boundary)//', '// &
+        place_of_body(shapes, layer%shape)
       if (layer%edge > 0) place = place//', edge '//integer_text(layer%edge)
     end if
   end function place_of_layer

@@ -14,6 +14,7 @@ module pd_region
   !> A polygon that adds material or takes it away.
   type :: shape_t
     real(wp), allocatable :: vertices(:, :)   !! (2,n) [spacings]
+    character(:), allocatable :: name         !! for messages
     logical  :: solid = .true.                !! else a hole
     real(wp) :: near = 1.0e-6_wp              !! a point so near to an edge is on it [spacings]
   end type shape_t
@@ -100,7 +101,8 @@ contains
     end do
   end subroutine sort
 
-  !> Corners of the box around the solids.
+  !> Corners of the box around the solids. What is as near to a lattice line, or to the middle
+  !> between two, as a point on an edge is to the edge, lies there.
   pure function box_of(shapes) result(box)
     type(shape_t), intent(in) :: shapes(:)
     real(wp) :: box(2, 2)                     !! lower, upper corner
@@ -110,10 +112,18 @@ contains
     box(:, 2) = -huge(1.0_wp)
     do k = 1, size(shapes)
       if (.not. shapes(k)%solid) cycle
-      box(:, 1) = min(box(:, 1), minval(shapes(k)%vertices, 2))
-      box(:, 2) = max(box(:, 2), maxval(shapes(k)%vertices, 2))
+      box(:, 1) = min(box(:, 1), even(minval(shapes(k)%vertices, 2), shapes(k)%near))
+      box(:, 2) = max(box(:, 2), even(maxval(shapes(k)%vertices, 2), shapes(k)%near))
     end do
   end function box_of
+
+  !> The next multiple of one half where it is near.
+  elemental real(wp) function even(x, near)
+    real(wp), intent(in) :: x, near
+
+    even = 0.5_wp * anint(2.0_wp * x)
+    if (abs(x - even) > near) even = x
+  end function even
 
   !> The part of all places of a grid: the place of element (i, j) is first + width (i - 1, j - 1).
   pure subroutine parts_on_grid(shapes, first, width, part)

@@ -92,7 +92,7 @@ contains
     logical :: taken(2)
 
     taken = .true.
-    if (boundary%contact == 'smooth') taken = [1, 2] == normal_axis(boundary%side)
+    if (boundary%contact == 'smooth') taken = [1, 2] == boundary%axis
   end function taken
 
   !> Length of a side that carries x and y of a traction [m]: of the body, and of the layers at its
