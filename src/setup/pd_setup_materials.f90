@@ -68,7 +68,7 @@ contains
     call set_up_strength(input, material_of, model%body%position, strength)
     model%strength = model%operators%storage%spread(strength)
     if (input%stabilisation%method == 'silling') &
-      call set_up_control(input%stabilisation%factor, material_of, model)
+      call set_up_control(input%stabilisation%factor, law_of, model)
   end subroutine set_up_materials
 
   !> The layers of smooth boundaries that hold a part of a side, or an edge, become bearings: one
@@ -90,6 +90,7 @@ contains
         allocate (list(n + 1))
         list(:n) = model%materials%list
         list(n + 1) = list(j)
+        list(n + 1)%youngs_modulus = 0.0_wp   ! no control: what does not flow would never let it go
         deallocate (list(n + 1)%law)
         allocate (list(n + 1)%law, source=new_bearing(input%boundaries(k)%axis, list(j)%law))
         call move_alloc(list, model%materials%list)
