@@ -193,7 +193,7 @@ contains
       '  RUN.nml             the input file, Fortran namelists: see doc/input.md and input/', &
       '', &
       '  --check             check the input and print the derived figures; run nothing', &
-      '  --points FILE       with --check: write points, boundaries and loads to a file; the command', &
+      '  --points FILE       with --check: write points, boundaries and loads to a file;', &
       '                      perigeo-post geometry RUN.nml draws them', &
       '  --output DIR        folder for the results (default: output_dir of the input file,', &
       '                      or results/<name>)', &

@@ -8,7 +8,7 @@ module pd_geometry
   use pd_layers, only: fill_edges, fill_layer, layer_t
   use pd_places, only: empty, give_slivers, lattice_t, new_places, places_t, volume_at
   use pd_point_sets, only: side_t
-  use pd_region, only: area_within, box_of, shape_t
+  use pd_region, only: area_within, box_of, length_within, shape_t
   use pd_sides, only: bottom, left, normal_axis, outward, right, side_count, side_names, top
   use pd_text, only: integer_text
   implicit none
@@ -128,15 +128,15 @@ contains
     do k = 1, size(places%shapes)
       if (places%shapes(k)%solid) then
         if (.not. any(places%part == k)) call errors%add('a body leaves no point', &
-          place_of_body(places%shapes, k), 'later bodies cover it, or it lies between the places of the lattice', &
-          'at least one point of its own')
+          place_of_body(places%shapes, k), 'later bodies cover it, or it lies between the places '// &
+          'of the lattice', 'at least one point of its own')
       else
         box(:, 1) = minval(places%shapes(k)%vertices, 2)
         box(:, 2) = maxval(places%shapes(k)%vertices, 2)
         if (area_within(places%shapes(:k - 1), box(:, 1), box(:, 2)) &
           - area_within(places%shapes(:k), box(:, 1), box(:, 2)) <= hardly) call errors%add( &
-          'a hole takes nothing away', place_of_body(places%shapes, k), 'no solid before it lies there', &
-          'a hole in one of the bodies before it')
+          'a hole takes nothing away', place_of_body(places%shapes, k), &
+          'no solid before it lies there', 'a hole in one of the bodies before it')
       end if
     end do
   end subroutine look_at_shapes
@@ -244,19 +244,17 @@ contains
     real(wp),        intent(in)    :: origin(2)
     type(lattice_t), intent(in)    :: lattice
     type(body_t),    intent(inout) :: body
-    integer :: squares(side_count), k
+    integer :: k
 
-    squares = places%line
-    if (.not. lattice%cells) squares([top, right]) = squares([top, right]) - 1
     do k = 1, side_count
       associate (side => body%sides(k), along => 3 - normal_axis(side_names(k)), &
         line => places%line(k))
         if (along == 1) then
-          call find_side(lbound(places%number, 1), places%number(:, line), &
-            places%filled(:, squares(k)), origin(1), lattice, side)
+          call find_side(places, lbound(places%number, 1), places%number(:, line), k, origin(1), &
+            lattice, side)
         else
-          call find_side(lbound(places%number, 2), places%number(line, :), &
-            places%filled(squares(k), :), origin(2), lattice, side)
+          call find_side(places, lbound(places%number, 2), places%number(line, :), k, origin(2), &
+            lattice, side)
         end if
         side%name = trim(side_names(k))
         side%axis = 3 - along
@@ -267,31 +265,54 @@ contains
     end do
   end subroutine find_sides
 
-  !> The points of one line of places, and the part of the squares along it that each has.
-  pure subroutine find_side(first, number, filled, origin, lattice, side)
-    integer,         intent(in)  :: first             !! index of the first place
-    integer,         intent(in)  :: number(first:)
-    logical,         intent(in)  :: filled(first:)
-    real(wp),        intent(in)  :: origin            !! coordinate of place 0 [m]
-    type(lattice_t), intent(in)  :: lattice
-    type(side_t),    intent(out) :: side
+  !> The points of one line of places, and the part of the side that each has.
+  pure subroutine find_side(places, first, number, k, origin, lattice, side)
+    type(places_t),  intent(in)    :: places
+    integer,         intent(in)    :: first             !! index of the first place
+    integer,         intent(in)    :: number(first:)
+    integer,         intent(in)    :: k                 !! number of the side
+    real(wp),        intent(in)    :: origin            !! coordinate of place 0 [m]
+    type(lattice_t), intent(in)    :: lattice
+    type(side_t),    intent(inout) :: side
     real(wp) :: ends(2)
-    integer  :: i, k
+    integer  :: i, n
 
     allocate (side%points(count(number > 0)))
     allocate (side%from(size(side%points)), side%to(size(side%points)))
-    k = 0
+    n = 0
     do i = first, ubound(number, 1)
       if (number(i) == 0) cycle
-      k = k + 1
+      n = n + 1
       ends = [0.0_wp, 1.0_wp]
-      if (.not. lattice%cells) &
-        ends = merge([-0.5_wp, 0.5_wp], [0.0_wp, 0.0_wp], filled(i - 1:i))
-      side%points(k) = number(i)
-      side%from(k) = origin + (real(i, wp) + ends(1)) * lattice%spacing
-      side%to(k) = origin + (real(i, wp) + ends(2)) * lattice%spacing
+      if (.not. lattice%cells) ends = [-part_of_side(places, k, i, -1, number(i - 1) > 0), &
+        part_of_side(places, k, i, 1, number(i + 1) > 0)]
+      side%points(n) = number(i)
+      side%from(n) = origin + (real(i, wp) + ends(1)) * lattice%spacing
+      side%to(n) = origin + (real(i, wp) + ends(2)) * lattice%spacing
     end do
   end subroutine find_side
+
+  !> How far the part of side k that belongs to the point at place i goes in a direction [spacings]:
+  !> halfway to the next point, or to the end of the side.
+  pure real(wp) function part_of_side(places, k, i, direction, has_next) result(part)
+    type(places_t), intent(in) :: places
+    integer,        intent(in) :: k, i, direction
+    logical,        intent(in) :: has_next    !! there is a point at the next place
+    real(wp), parameter :: just_inside = 1.0e-4_wp
+    real(wp) :: ends(2)
+    integer  :: along, square(2)
+
+    along = 3 - normal_axis(side_names(k))
+    square(along) = i + min(direction, 0)
+    square(3 - along) = places%line(k) - merge(1, 0, outward(side_names(k)) > 0)
+    part = 0.0_wp
+    if (.not. places%filled(square(1), square(2))) return
+    part = 0.5_wp
+    if (places%whole(square(1), square(2))) return
+    ends = real(i, wp) + merge(0.5_wp, 1.0_wp, has_next) * [min(direction, 0), max(direction, 0)]
+    part = length_within(places%shapes, along, places%box(3 - along, merge(2, 1, &
+      outward(side_names(k)) > 0)) - just_inside * real(outward(side_names(k)), wp), ends)
+  end function part_of_side
 
   !> Lowest and highest column and row that hold a point.
   pure subroutine occupied_box(places, low, high)

@@ -6,7 +6,8 @@ module pd_layers
   use pd_places, only: empty, lattice_t, places_t
   use pd_polygons, only: distance_to_edge, edge_axis, next_vertex, outward_normal
   use pd_region, only: part_at
-  use pd_sides, only: bottom, covers, left, right, top
+  use pd_sides, only: bottom, covers, left, normal_axis, outward, right, side_count, side_names, &
+    top
   implicit none
   private
 
@@ -149,8 +150,8 @@ contains
   end subroutine find_range
 
   !> Mark the fictitious points beyond edges: beyond an edge along an axis whole rows as beyond a
-  !> side, beyond an inclined one the empty places whose foot lies on it, no further away than the
-  !> horizon. Where two edges with layers meet, the corner outside of both is filled too.
+  !> side; beyond an inclined one, or one shorter than a spacing, the empty places whose foot lies
+  !> on it, no further away than the horizon. Where two edges with layers meet, the corner outside of both is filled too.
   subroutine fill_edges(layer, layers, lattice, places)
     type(layer_t),   intent(in)    :: layer
     type(layer_t),   intent(in)    :: layers(:)
@@ -164,7 +165,8 @@ contains
         if (layer%edge /= 0 .and. layer%edge /= k) cycle
         normal = outward_normal(shape%vertices, k)
         if (.not. shape%solid) normal = -normal
-        if (edge_axis(shape%vertices, k) == 0) then
+        if (edge_axis(shape%vertices, k) == 0 .or. norm2(shape%vertices(:, k) &
+          - shape%vertices(:, next_vertex(shape%vertices, k))) < 1.0_wp) then
           call fill_inclined(layer, k, normal, lattice, places)
         else
           call fill_rows(layer, k, normal, lattice, places)
@@ -172,9 +174,9 @@ contains
       end do
       do k = 1, size(shape%vertices, 2)
         if (layer%edge /= 0 .and. layer%edge /= k) cycle
-        if (has_layer(layers, layer%shape, before(k))) call fill_corner(layer, before(k), k, k, &
-          lattice, places)
-        if (layer%edge /= 0 .and. has_layer(layers, layer%shape, after(k))) &
+        if (has_layer(layers, layer%shape, before(k), places)) &
+          call fill_corner(layer, before(k), k, k, lattice, places)
+        if (layer%edge /= 0 .and. has_layer(layers, layer%shape, after(k), places)) &
           call fill_corner(layer, k, after(k), after(k), lattice, places)
       end do
     end associate
@@ -195,17 +197,42 @@ contains
 
   end subroutine fill_edges
 
-  !> Whether there is a layer beyond an edge.
-  pure logical function has_layer(layers, shape, edge)
-    type(layer_t), intent(in) :: layers(:)
-    integer,       intent(in) :: shape, edge
-    integer :: k
+  !> Whether there is a layer beyond an edge: its own, or that of a whole side which it lies on.
+  pure logical function has_layer(layers, shape, edge, places)
+    type(layer_t),  intent(in) :: layers(:)
+    integer,        intent(in) :: shape, edge
+    type(places_t), intent(in) :: places
+    integer :: k, side
 
     has_layer = .false.
+    side = side_of_edge(places, shape, edge)
     do k = 1, size(layers)
-      has_layer = has_layer .or. layers(k)%shape == shape .and. any(layers(k)%edge == [0, edge])
+      if (layers(k)%shape == 0) then
+        if (side == 0 .or. allocated(layers(k)%span)) cycle
+        has_layer = has_layer .or. covers(layers(k)%side, side)
+      else
+        has_layer = has_layer .or. layers(k)%shape == shape .and. any(layers(k)%edge == [0, edge])
+      end if
     end do
   end function has_layer
+
+  !> The side of the body that an edge lies on; 0: none.
+  pure integer function side_of_edge(places, shape, edge) result(side)
+    type(places_t), intent(in) :: places
+    integer,        intent(in) :: shape, edge
+    integer :: axis, end, s
+
+    side = 0
+    associate (v => places%shapes(shape)%vertices)
+      axis = edge_axis(v, edge)
+      if (axis == 0) return
+      do s = 1, side_count
+        end = merge(1, 2, outward(side_names(s)) < 0)
+        if (normal_axis(side_names(s)) == axis .and. abs(v(axis, edge) - places%box(axis, end)) &
+          <= round_off) side = s
+      end do
+    end associate
+  end function side_of_edge
 
   !> Rows beyond edge k, which is parallel to an axis: beyond each point of the row next to it.
   subroutine fill_rows(layer, k, normal, lattice, places)

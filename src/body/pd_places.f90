@@ -152,7 +152,7 @@ contains
     area = area_within(places%shapes, corner, corner + 0.5_wp)
   end function area_of_half
 
-  !> Area of the region, layers included, in the cell around a place [spacing^2].
+  !> Area of the region, layers included, in the cell around a place that holds a point [spacing^2].
   pure real(wp) function volume_at(places, lattice, i, j) result(volume)
     type(places_t),  intent(in) :: places
     type(lattice_t), intent(in) :: lattice
@@ -189,7 +189,12 @@ contains
     do j = places%squares(1, 2), places%squares(2, 2) + 1
       do i = places%squares(1, 1), places%squares(2, 1) + 1
         if (places%owner(i, j) /= empty) cycle
-        sliver = volume_at(places, lattice, i, j)
+        if (lattice%cells) then
+          sliver = area_of_square(places, i, j)
+        else
+          sliver = area_of_half(places, 2 * i - 1, 2 * j - 1) + area_of_half(places, 2 * i, &
+            2 * j - 1) + area_of_half(places, 2 * i - 1, 2 * j) + area_of_half(places, 2 * i, 2 * j)
+        end if
         if (sliver <= 0.0_wp) cycle
         k = nearest_point(places, i, j)
         if (k > 0) volume(k) = volume(k) + sliver

@@ -40,7 +40,7 @@ contains
   end function boundary_set
 
   !> The columns of the layer of boundary k across its side, each with the point of the body next to
-  !> it first; 0: no point (most in a column, columns). Points without such a neighbour are left out.
+  !> it first; 0: no point (most in a column, columns). Points without a neighbour are left out.
   pure function columns_of(owner, place, k, axis, rows) result(columns)
     integer, intent(in) :: owner(:)             !! boundary of every point
     integer, intent(in) :: place(:, :)          !! column and row on the lattice (n,2)

@@ -9,7 +9,8 @@ module pd_region
   implicit none
   private
 
-  public :: shape_t, part_at, part_on, parts_on_grid, mark_edges, area_within, box_of, on_edges
+  public :: shape_t, part_at, part_on, parts_on_grid, mark_edges, on_edges
+  public :: area_within, length_within, box_of
 
   !> A polygon that adds material or takes it away.
   type :: shape_t
@@ -254,6 +255,37 @@ contains
         heights(k - 1:k))
     end do
   end function area_within
+
+  !> Length of the region on a piece of a line along an axis.
+  pure real(wp) function length_within(shapes, along, across, ends) result(length)
+    type(shape_t), intent(in) :: shapes(:)
+    integer,       intent(in) :: along      !! 1: x, 2: y
+    real(wp),      intent(in) :: across     !! coordinate of the line
+    real(wp),      intent(in) :: ends(2)    !! of the piece, ascending
+    real(wp), allocatable :: cuts(:)
+    real(wp) :: x(2), y
+    integer  :: i, k
+
+    cuts = ends
+    do i = 1, size(shapes)
+      associate (v => shapes(i)%vertices, other => 3 - along)
+        do k = 1, size(v, 2)
+          associate (a => v(:, k), b => v(:, next_vertex(v, k)))
+            if ((a(other) <= across) .eqv. (b(other) <= across)) cycle
+            y = a(along) + (across - a(other)) * (b(along) - a(along)) / (b(other) - a(other))
+            if (y > ends(1) .and. y < ends(2)) cuts = [cuts, y]
+          end associate
+        end do
+      end associate
+    end do
+    call sort(cuts)
+    length = 0.0_wp
+    x(3 - along) = across
+    do k = 2, size(cuts)
+      x(along) = 0.5_wp * (cuts(k - 1) + cuts(k))
+      if (part_at(shapes, x) > 0) length = length + (cuts(k) - cuts(k - 1))
+    end do
+  end function length_within
 
   !> Edges that reach into a box: x and y of the lower end, x and y of the upper end (4, edges).
   pure function edges_near(shapes, low, high) result(edges)

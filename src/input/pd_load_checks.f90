@@ -61,7 +61,7 @@ contains
     integer :: along, i
 
     if (is_cloud(input)) call errors%add('a traction on a boundary of a point cloud', &
-      where=place_of(group, 'traction'), found='shape = ''file''', allowed='only for bodies on a lattice')
+      where=place_of(group, 'traction'), found='shape = ''file''', allowed='only on a lattice')
     if (b%contact == 'affine') call errors%add('an affine boundary under a traction', &
       where=place_of(group, 'contact'), found='''affine''', allowed='''rough'', ''smooth''')
     if (b%side == 'all') call errors%add('a traction on all sides', &
@@ -126,7 +126,7 @@ contains
 
     if (is_cloud(input)) then
       call errors%add('a pressure on a point cloud', where=place_of(group, 'side'), &
-                      found='shape = ''file''', allowed='only for bodies on a lattice')
+                      found='shape = ''file''', allowed='only on a lattice')
       return
     end if
     if (input%pressures(k)%side == '') return
@@ -176,7 +176,7 @@ contains
 
     if (.not. is_given(group, 'span')) return
     if (is_cloud(input)) call errors%add('a span on a point cloud', &
-      where=place_of(group, 'span'), found='shape = ''file''', allowed='only for bodies on a lattice')
+      where=place_of(group, 'span'), found='shape = ''file''', allowed='only on a lattice')
     if (b%side == 'all') call errors%add('a span on all sides', &
       where=place_of(group, 'side'), found='''all''', &
       allowed='''bottom'', ''top'', ''left'', ''right''')

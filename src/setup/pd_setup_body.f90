@@ -77,25 +77,58 @@ contains
     end do
   end subroutine cloud_body
 
-  !> Check that the weak patch and the random field touch points of the body that can yield.
+  !> Check that the weak patch and the random field touch points of the body. Where a material can
+  !> yield, one of these points must.
   subroutine look_at_patch(input, body, errors)
     type(input_t),      intent(in)    :: input
     type(body_t),       intent(in)    :: body
     type(error_list_t), intent(inout) :: errors
-    logical :: in_patch(body%n)
+    logical :: counts(body%n), in_patch(body%n)
     integer :: i
 
+    counts = body%boundary == 0
+    if (any_yields(input)) then
+      do i = 1, body%n
+        counts(i) = counts(i) .and. yields(input, input%bodies(body%part(i))%material)
+      end do
+    end if
+    if (is_set(input%random_field%coefficient_of_variation) .and. .not. any(counts)) &
+      call errors%add('the random field touches no point that can yield', '&random_field')
     associate (flaw => input%imperfection)
       if (.not. flaw%amplitude > 0.0_wp) return
       do i = 1, body%n
-        in_patch(i) = body%boundary(i) == 0 .and. norm2(body%position(i, :) - [flaw%x, flaw%y]) &
+        in_patch(i) = norm2(body%position(i, :) - [flaw%x, flaw%y]) &
           <= flaw%radius * (1.0_wp + 1.0e-6_wp)
       end do
-      if (.not. any(in_patch)) call errors%add('the weak patch holds no point of the body', &
-        '&imperfection', short_number(flaw%radius)//' m about '//short_number(flaw%x)//', '// &
+      if (.not. any(in_patch .and. counts)) call errors%add( &
+        'the weak patch holds no point of the body that can yield', '&imperfection', &
+        short_number(flaw%radius)//' m about '//short_number(flaw%x)//', '// &
         short_number(flaw%y), 'a patch in the body, wider than the spacing')
     end associate
   end subroutine look_at_patch
+
+  !> Whether one of the materials can yield.
+  pure logical function any_yields(input)
+    type(input_t), intent(in) :: input
+    integer :: k
+
+    any_yields = .false.
+    do k = 1, size(input%materials)
+      any_yields = any_yields .or. input%materials(k)%model == 'j2'
+    end do
+  end function any_yields
+
+  !> Whether the material of a name can yield.
+  pure logical function yields(input, name)
+    type(input_t), intent(in) :: input
+    character(*),  intent(in) :: name
+    integer :: k
+
+    yields = .false.
+    do k = 1, size(input%materials)
+      if (input%materials(k)%name == name) yields = input%materials(k)%model == 'j2'
+    end do
+  end function yields
 
   !> Body from rectangles, polygons and circles on one lattice, which starts at the lower left
   !> corner of the first one, or of the box around it.
