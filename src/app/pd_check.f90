@@ -3,11 +3,12 @@ module pd_check
   use, intrinsic :: iso_fortran_env, only: output_unit
   use omp_lib, only: omp_get_max_threads
   use pd_command_line, only: options_t, print_help
-  use pd_errors, only: error_list_t, exit_input, exit_ok, outcome_t
+  use pd_errors, only: error_list_t, exit_file, exit_input, exit_ok, outcome_t
   use pd_input, only: print_input
   use pd_input_reference, only: write_input_reference, write_input_reference_json
   use pd_input_types, only: all_keys
   use pd_kinds, only: wp
+  use pd_points_file, only: write_points
   use pd_run, only: run_t
   use pd_stability, only: find_highest_frequency
   use pd_summary, only: estimated_seconds, summarise, summary_t
@@ -42,13 +43,18 @@ contains
   end subroutine answer_questions
 
   !> Print the derived figures of a run that is set up; the program then ends.
-  subroutine print_check(path, run, outcome)
-    character(*),    intent(in)    :: path      !! of the input file
+  subroutine print_check(path, points_path, run, outcome)
+    character(*),    intent(in)    :: path          !! of the input file
+    character(*),    intent(in)    :: points_path   !! file for the points; '': none
     type(run_t),     intent(inout) :: run
     type(outcome_t), intent(inout) :: outcome
+    type(error_list_t) :: errors
     type(summary_t) :: summary
     integer :: i
 
+    if (points_path /= '') call write_points(points_path, run%input, run%model, errors)
+    call outcome%end_if_any(errors, exit_file)
+    if (outcome%done) return
     call find_highest_frequency(run%model)
     if (.not. run%model%at_equilibrium .and. &
       run%clock%time_step * run%model%highest_frequency > 2.0_wp) call run%warnings%add( &

@@ -13,6 +13,7 @@ module pd_command_line
   type :: options_t
     character(:), allocatable :: input_path
     character(:), allocatable :: output_dir   !! '': as in the input
+    character(:), allocatable :: points_path  !! file for the points, with --check; '': none
     type(setting_t), allocatable :: settings(:)   !! values in place of those of the input file
     integer :: threads = 0                    !! 0: as OMP_NUM_THREADS says
     logical :: check = .false., restart = .false., force = .false., quiet = .false.
@@ -34,6 +35,7 @@ contains
 
     options%input_path = ''
     options%output_dir = ''
+    options%points_path = ''
     allocate (options%settings(0))
     i = 0
     do while (i < command_argument_count())
@@ -67,6 +69,8 @@ contains
         call add_setting(word, options)
       case ('--output')
         call value_of('--output', 'a folder', options%output_dir)
+      case ('--points')
+        call value_of('--points', 'a file', options%points_path)
       case ('--threads')
         call read_threads(options%threads)
       case default
@@ -128,6 +132,8 @@ contains
 
     if (options%json .and. .not. options%input_reference) call errors%add( &
       '--json goes with --input-reference')
+    if (options%points_path /= '' .and. .not. options%check) call errors%add( &
+      '--points goes with --check')
     if (options%version .or. options%help .or. options%input_reference) return
     if (options%input_path == '' .and. errors%count() == 0) &
       call errors%add('no input file is given; perigeo --help shows how')
@@ -155,9 +161,9 @@ contains
   subroutine report_unknown(word, errors)
     character(*),       intent(in)    :: word
     type(error_list_t), intent(inout) :: errors
-    character(17), parameter :: known(12) = [character(17) :: '--check', '--output', '--threads', &
+    character(17), parameter :: known(13) = [character(17) :: '--check', '--output', '--threads', &
       '--restart', '--force', '--quiet', '--version', '--help', '--input-reference', '--json', &
-      '--set', '--print-input']
+      '--set', '--print-input', '--points']
     character(:), allocatable :: near
 
     near = nearest_name(word, known)
@@ -187,6 +193,8 @@ contains
       '  RUN.nml             the input file, Fortran namelists: see doc/input.md and input/', &
       '', &
       '  --check             check the input and print the derived figures; run nothing', &
+      '  --points FILE       with --check: write points, boundaries and loads to a file;', &
+      '                      perigeo-post geometry RUN.nml draws them', &
       '  --output DIR        folder for the results (default: output_dir of the input file,', &
       '                      or results/<name>)', &
       '  --threads N         number of threads (default: OMP_NUM_THREADS, or all cores)', &

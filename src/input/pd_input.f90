@@ -4,6 +4,7 @@ module pd_input
   use pd_input_checks, only: check_model, resolved_path
   use pd_input_printer, only: write_input
   use pd_input_settings, only: apply_settings, setting_t
+  use pd_input_shapes, only: axis_of
   use pd_input_types, only: all_keys, input_t
   use pd_input_values, only: check_groups, count_groups
   use pd_key_list, only: key_list_t
@@ -14,6 +15,7 @@ module pd_input
   use pd_namelist, only: scan_namelist
   use pd_namelist_groups, only: namelist_group_t
   use pd_platen_checks, only: platens_of
+  use pd_shape_checks, only: check_shapes
   use pd_text_file, only: read_text_file
   use pd_used_values, only: compare_used, used_values
   implicit none
@@ -76,6 +78,7 @@ contains
     call check_groups(groups, list, errors, input%path)
     call fill(groups, input)
     call check_model(input, groups, errors)
+    call check_shapes(input, groups, errors)
     call check_materials(input, groups, errors)
     call check_motion(input, groups, errors)
     call check_loads(input, groups, errors)
@@ -99,6 +102,9 @@ contains
     do k = 1, size(input%bodies)
       if (input%bodies(k)%material == '' .and. size(input%materials) > 0) &
         input%bodies(k)%material = input%materials(1)%name
+    end do
+    do k = 1, size(input%boundaries)
+      input%boundaries(k)%axis = axis_of(input, input%boundaries(k))
     end do
     input%platens = platens_of(input%boundaries)
   end subroutine fill

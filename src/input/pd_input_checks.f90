@@ -4,6 +4,7 @@
 !> because the problem has been reported already.
 module pd_input_checks
   use pd_errors, only: error_list_t
+  use pd_input_shapes, only: find_extents
   use pd_input_types, only: body_input_t, input_t
   use pd_input_values, only: group_named, is_damaged, is_given
   use pd_kinds, only: is_set, wp
@@ -47,6 +48,18 @@ contains
       if (input%bodies(k)%shape == 'file') is_cloud = .true.
     end do
   end function is_cloud
+
+  !> Whether one of the bodies is a rectangle, or has no shape because it is wrong.
+  pure logical function any_rectangle(input)
+    type(input_t), intent(in) :: input
+    integer :: k
+
+    any_rectangle = .false.
+    do k = 1, size(input%bodies)
+      if (input%bodies(k)%shape == 'rectangle' .or. input%bodies(k)%shape == '') &
+        any_rectangle = .true.
+    end do
+  end function any_rectangle
 
   !> Path of a file that the input names: as it is if absolute, else in the folder of the input
   !> file, or, if it is not there, in the working directory.
@@ -96,6 +109,8 @@ contains
       return
     end if
     call add_useless(group, 'cloud_weights', 'on a lattice', errors)
+    if (size(input%bodies) > 0 .and. .not. any_rectangle(input)) &
+      call add_useless(group, 'fit', 'without a rectangle', errors)
     associate (d => input%discretisation)
       if (.not. (is_set(d%spacing) .and. is_set(d%horizon))) return
       if (d%horizon < d%spacing*(1.0_wp - lattice_tolerance)) then
@@ -142,7 +157,7 @@ contains
           found='lattice', allowed='auto or list')
         if (size(input%bodies) > 1) call errors%add('a point cloud beside another body', &
           where=place_of(group, 'shape'), found=integer_text(size(input%bodies))//' bodies', &
-          allowed='rectangles only, or one point cloud alone')
+          allowed='shapes on a lattice only, or one point cloud alone')
         if (n > 0 .and. n < size(extents)) call errors%add( &
           'only some of the extents of a point cloud are given', where=place_of(group), &
           found=integer_text(n), allowed='all of x_min, x_max, y_min, y_max, or none')
@@ -196,7 +211,8 @@ contains
     character,              intent(in)    :: axis
     type(namelist_group_t), intent(in)    :: group
     type(error_list_t),     intent(inout) :: errors
-    real(wp) :: extent, first, fits, lower, spacing, steps
+    real(wp) :: extent, first, fits, high(2), low(2), lower, spacing, steps
+    logical  :: known
 
     spacing = input%discretisation%spacing
     if (.not. is_set(spacing)) return
@@ -216,8 +232,9 @@ contains
                       where=place_of(group, axis//'_max'), found=number_text(rounded(extent)), &
                       allowed=neighbours(steps, spacing)//', or fit = ''nearest''')
     end if
-    first = merge(input%bodies(1)%x_min, input%bodies(1)%y_min, axis == 'x')
-    if (k == 1 .or. .not. is_set(first)) return
+    call find_extents(input%bodies(:1), spacing, low, high, known)
+    first = merge(low(1), low(2), axis == 'x')
+    if (k == 1 .or. .not. known) return
     steps = (lower - first)/spacing
     if (abs(steps - anint(steps)) > lattice_tolerance) call errors%add( &
       'the body is not on the lattice of the first body along '//axis, &
@@ -253,44 +270,28 @@ contains
     real(wp) :: points
     integer  :: k
 
-    if (.not. is_set(input%discretisation%spacing)) return
-    points = 0.0_wp
+    if (.not. is_set(input%discretisation%spacing) .or. is_cloud(input)) return
+    points = points_of(input%bodies, input%discretisation%spacing)
     do k = 1, size(input%bodies)
-      points = points + points_of(input%bodies(k), input%discretisation%spacing)
+      points = max(points, points_of(input%bodies(k:k), input%discretisation%spacing))
     end do
-    if (size(input%bodies) > 0) &
-      points = max(points, points_of(hull(input%bodies), input%discretisation%spacing))
     if (points > max_points) call errors%add( &
       'the bodies, or the box around them, would have too many points', &
       where=place_of(group_named(groups, 'discretisation', 1, input%path), 'spacing'), &
       found='about '//number_text(rounded(points)), allowed='at most 1e8')
   end subroutine check_number_of_points
 
-  !> The rectangle around all rectangles.
-  pure function hull(bodies) result(box)
+  !> About how many points there are in the box around bodies; 0 where it is not known.
+  pure real(wp) function points_of(bodies, spacing)
     type(body_input_t), intent(in) :: bodies(:)
-    type(body_input_t) :: box
-
-    box = bodies(1)
-    box%x_min = minval(bodies%x_min)
-    box%y_min = minval(bodies%y_min)
-    box%x_max = maxval(bodies%x_max)
-    box%y_max = maxval(bodies%y_max)
-  end function hull
-
-  !> About how many points a rectangle has; 0 for anything else.
-  pure real(wp) function points_of(body, spacing)
-    type(body_input_t), intent(in) :: body
     real(wp),           intent(in) :: spacing
+    real(wp) :: lower(2), upper(2)
+    logical  :: known
 
     points_of = 0.0_wp
-    if (body%shape /= 'rectangle') return
-    if (.not. (is_set(body%x_min) .and. is_set(body%x_max) .and. is_set(body%y_min) &
-               .and. is_set(body%y_max))) return
-    if (body%x_max <= body%x_min .or. body%y_max <= body%y_min) return
+    call find_extents(bodies, spacing, lower, upper, known)
     ! Bounded first: the plain product can overflow.
-    points_of = min(1.0e20_wp, (body%x_max - body%x_min)/spacing + 1.0_wp) &
-      *min(1.0e20_wp, (body%y_max - body%y_min)/spacing + 1.0_wp)
+    if (known) points_of = product(min(1.0e20_wp, (upper - lower)/spacing + 1.0_wp))
   end function points_of
 
   subroutine check_stabilisation(input, group, errors)

@@ -5,6 +5,7 @@
 module pd_load_checks
   use pd_errors, only: error_list_t
   use pd_input_checks, only: add_useless, is_cloud
+  use pd_input_shapes, only: find_extents
   use pd_input_types, only: boundary_input_t, input_t
   use pd_input_values, only: group_named, is_given
   use pd_kinds, only: is_set, wp
@@ -60,7 +61,7 @@ contains
     integer :: along, i
 
     if (is_cloud(input)) call errors%add('a traction on a boundary of a point cloud', &
-      where=place_of(group, 'traction'), found='shape = ''file''', allowed='only for rectangles')
+      where=place_of(group, 'traction'), found='shape = ''file''', allowed='only on a lattice')
     if (b%contact == 'affine') call errors%add('an affine boundary under a traction', &
       where=place_of(group, 'contact'), found='''affine''', allowed='''rough'', ''smooth''')
     if (b%side == 'all') call errors%add('a traction on all sides', &
@@ -73,7 +74,7 @@ contains
       exit
     end do
     if (b%contact /= 'smooth' .or. size(b%traction) == 0) return
-    along = merge(2, 1, normal_axis(b%side) == 1)
+    along = merge(2, 1, b%axis == 1)
     if (abs(b%traction(along)) > 0.0_wp) call errors%add( &
       'a smooth boundary carries no traction along its side', &
       where=place_of(group, 'traction'), found=number_text(b%traction(along)), &
@@ -125,7 +126,7 @@ contains
 
     if (is_cloud(input)) then
       call errors%add('a pressure on a point cloud', where=place_of(group, 'side'), &
-                      found='shape = ''file''', allowed='only for rectangles')
+                      found='shape = ''file''', allowed='only on a lattice')
       return
     end if
     if (input%pressures(k)%side == '') return
@@ -147,20 +148,17 @@ contains
     real(wp),               intent(in)    :: span(:)   !! from, to [m]; size 0: none
     type(namelist_group_t), intent(in)    :: group
     type(error_list_t),     intent(inout) :: errors
-    real(wp) :: lower, upper, slack
+    real(wp) :: high(2), low(2), lower, upper, slack
+    logical  :: known
 
     if (size(span) == 0) return
     call check_increasing(span, 'span', group, errors)
     if (span(2) <= span(1) .or. normal_axis(side) == 0 .or. is_cloud(input)) return
     if (size(input%bodies) == 0 .or. .not. is_set(input%discretisation%spacing)) return
-    if (normal_axis(side) == 2) then
-      lower = minval(input%bodies%x_min)
-      upper = maxval(input%bodies%x_max)
-    else
-      lower = minval(input%bodies%y_min)
-      upper = maxval(input%bodies%y_max)
-    end if
-    if (.not. (is_set(lower) .and. is_set(upper))) return
+    call find_extents(input%bodies, input%discretisation%spacing, low, high, known)
+    if (.not. known) return
+    lower = low(3 - normal_axis(side))
+    upper = high(3 - normal_axis(side))
     slack = merge(1.0_wp, 1.0e-6_wp, input%discretisation%fit == 'nearest') &
       * input%discretisation%spacing
     if (span(1) < lower - slack .or. span(2) > upper + slack) call errors%add( &
@@ -178,7 +176,7 @@ contains
 
     if (.not. is_given(group, 'span')) return
     if (is_cloud(input)) call errors%add('a span on a point cloud', &
-      where=place_of(group, 'span'), found='shape = ''file''', allowed='only for rectangles')
+      where=place_of(group, 'span'), found='shape = ''file''', allowed='only on a lattice')
     if (b%side == 'all') call errors%add('a span on all sides', &
       where=place_of(group, 'side'), found='''all''', &
       allowed='''bottom'', ''top'', ''left'', ''right''')

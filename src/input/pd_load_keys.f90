@@ -2,7 +2,7 @@
 !>
 !> A key is a component here and a line in the procedure that visits it: nothing else lists it.
 module pd_load_keys
-  use pd_keys, only: any_count, group_key_t, key_t, key_visitor_t, not_negative, positive
+  use pd_keys, only: any_count, group_key_t, key_t, key_visitor_t, not_negative, positive, range_t
   use pd_kinds, only: unset, wp
   implicit none
   private
@@ -11,6 +11,10 @@ module pd_load_keys
 
   type :: boundary_input_t
     character(:), allocatable :: name, side, contact   !! side: '' where a point cloud names it
+    character(:), allocatable :: body                  !! name of a body; '': on a side
+    integer  :: edge = 0                               !! of this body; 0: all of them
+    integer  :: axis = 0                               !! of the normal, 1: x, 2: y; 0: no single
+                                                       !! one; no key
     real(wp), allocatable :: span(:)                   !! from, to [m]; size 0: the whole side
     real(wp) :: velocity(2) = 0.0_wp                   !! [m/s]
     real(wp), allocatable :: times(:)                  !! [s]; size 0: no table
@@ -44,15 +48,24 @@ contains
     call visitor%text_key(key_t('name', required=.true., is_name=.true., also='each name once', &
       meaning='name in the results, and in the file of a point cloud'), self%name)
     call visitor%text_key(key_t('side', stands_for='none', choices='bottom top left right all', &
-      also='needed for rectangles, each side or span once, all alone; not all for a cloud', &
+      also='on a lattice this or body; each side or span once, all alone; not all for a cloud', &
       meaning='side of the body beyond which the layers of points lie; for a cloud the side ' &
       //'that the boundary stands for'), self%side)
     call visitor%list_key(key_t('span', count=2, unit='m', stands_for='the whole side', &
-      also='increasing, within the side; rectangles only; not with traction, not all', &
+      also='increasing, within the side; only with side; not with traction, not all, no cloud', &
       meaning='part of the side, as of a footing: from, to, in the coordinate along it; the ' &
       //'layers hold the points strictly inside'), self%span)
+    call visitor%text_key(key_t('body', is_name=.true., stands_for='none', &
+      also='name of a body; in place of side', &
+      meaning='body beyond whose edges the layers lie: outside of a solid, inside of a hole'), &
+      self%body)
+    call visitor%integer_key(key_t('edge', unit='1', range=range_t(lower=1.0_wp), &
+      stands_for='all edges of the body', needs_effect=.true., &
+      also='only with body; not for a circle; each edge once', &
+      meaning='number of the edge: that of the vertex it begins at; of a rectangle 1: bottom, ' &
+      //'2: right, 3: top, 4: left'), self%edge)
     call visitor%text_key(key_t('contact', default='rough', choices='rough smooth affine', &
-      also='smooth needs one side, not all', &
+      also='smooth needs one side, or one edge along an axis', &
       meaning='rough: both components of the motion prescribed; smooth: only the one across ' &
       //'the side; affine: the motion of a homogeneous deformation'), self%contact)
     call visitor%vector_key(key_t('velocity', count=2, unit='m/s', default='0.0, 0.0', &
@@ -74,7 +87,7 @@ contains
       stands_for='1 at all times', also='as many as times; only with affine', &
       meaning='factors on velocity_gradient at these times'), self%factors)
     call visitor%list_key(key_t('traction', count=2, unit='Pa', stands_for='none', &
-      also='in place of a motion; smooth: 0 along the side; rectangles only, not affine, not all', &
+      also='in place of a motion; smooth: 0 along the side; a whole side only, not affine', &
       meaning='force per area that acts on the platen from outside, x and y: the platen moves ' &
       //'under it and stays plane'), self%traction)
     call visitor%real_key(key_t('ramp_time', unit='s', default='0.0', range=not_negative, &

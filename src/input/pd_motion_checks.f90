@@ -11,7 +11,6 @@ module pd_motion_checks
   use pd_namelist, only: max_problems
   use pd_namelist_groups, only: namelist_group_t, place_of
   use pd_platen_checks, only: platen_approach, platen_extent, platen_under_load
-  use pd_sides, only: normal_axis
   use pd_tables, only: table_t
   use pd_text, only: integer_text, number_text
   implicit none
@@ -74,7 +73,8 @@ contains
           allowed='''bottom'', ''top'', ''left'', ''right'', or leave it out')
         return
       end if
-      if (.not. is_given(group, 'side')) call add_missing(group, 'side', 'for rectangles', errors)
+      if (.not. (is_given(group, 'side') .or. is_given(group, 'body'))) &
+        call add_missing(group, 'side', 'for bodies on a lattice, or body', errors)
       if (b%side == '') return
       do j = 1, k - 1
         if (apart(input%boundaries(j)%span, b%span)) cycle
@@ -177,13 +177,13 @@ contains
     character(12), parameter :: tables(2) = [character(12) :: 'velocities_x', 'velocities_y']
     integer :: along
 
-    if (normal_axis(b%side) == 0) then
-      if (.not. is_damaged(group, 'side')) call errors%add( &
+    if (b%axis == 0) then
+      if (.not. (is_damaged(group, 'side') .or. is_given(group, 'body'))) call errors%add( &
         'a smooth boundary without one side', where=place_of(group, 'side'), &
         found=''''//b%side//'''', allowed='''bottom'', ''top'', ''left'', ''right''')
       return
     end if
-    along = 3 - normal_axis(b%side)
+    along = 3 - b%axis
     if (abs(b%velocity(along)) > 0.0_wp) call errors%add( &
       'a smooth boundary does not prescribe the motion along its side', &
       where=place_of(group, 'velocity'), found=number_text(b%velocity(along)), &

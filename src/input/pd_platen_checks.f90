@@ -1,5 +1,6 @@
 !> Platens as the input describes them: which boundaries they are, and how they approach.
 module pd_platen_checks
+  use pd_input_shapes, only: find_extents
   use pd_input_types, only: boundary_input_t, input_t
   use pd_kinds, only: is_set, unset, wp
   use pd_sides, only: normal_axis, outward
@@ -81,25 +82,15 @@ contains
   !> not in the input.
   pure real(wp) function platen_extent(input) result(extent)
     type(input_t), intent(in) :: input
-    real(wp) :: lower, upper
-    integer  :: k
-    logical  :: upright
+    real(wp) :: lower(2), upper(2)
+    integer  :: axis
+    logical  :: known
 
     extent = unset
-    upright = normal_axis(input%boundaries(input%platens(1))%side) == 2
-    lower = huge(1.0_wp)
-    upper = -huge(1.0_wp)
-    if (size(input%bodies) == 0) return
-    do k = 1, size(input%bodies)
-      associate (b => input%bodies(k))
-        if (.not. (is_set(b%x_min) .and. is_set(b%x_max) .and. is_set(b%y_min) &
-                   .and. is_set(b%y_max))) return
-        lower = min(lower, merge(b%y_min, b%x_min, upright))
-        upper = max(upper, merge(b%y_max, b%x_max, upright))
-      end associate
-    end do
-    if (upper <= lower) return
-    extent = upper - lower
+    axis = normal_axis(input%boundaries(input%platens(1))%side)
+    call find_extents(input%bodies, input%discretisation%spacing, lower, upper, known)
+    if (.not. known) return
+    extent = upper(axis) - lower(axis)
     if (input%bodies(1)%shape == 'rectangle' .and. is_set(input%discretisation%spacing)) &
       extent = floor(extent/input%discretisation%spacing + 0.5_wp + 1.0e-6_wp) &
                *input%discretisation%spacing

@@ -38,8 +38,8 @@ module pd_used_values
 contains
 
   !> All values as used, defaults included, in the order of the reference; numbers with as
-  !> many digits as read back to the same bits, 'none' if there is no value. Bodies are labelled
-  !> with their number, boundaries, pressures and named materials with their name: body(1).x_min,
+  !> many digits as read back to the same bits, 'none' if there is no value. Bodies without a
+  !> name are labelled with their number, what has one with it: body(1).x_min,
   !> boundary(top).velocity, material(clay).density.
   function used_values(input) result(values)
     type(input_t), intent(in) :: input
@@ -106,6 +106,7 @@ contains
     character(:), allocatable, intent(inout) :: text
 
     if (key%name == 'name' .and. self%about%repeats) then
+      if (text == '') return   ! without a name it keeps its number
       self%label = trim(self%about%name)
       if (text /= key%default) self%label = self%label//'('//text//')'
     else if (text == '') then

@@ -28,20 +28,23 @@ module pd_reversal
 
 contains
 
-  !> Nothing seen yet. `kinematic`: of the materials, whether their softening is.
+  !> Nothing seen yet. `kinematic`: of the materials of the input, whether
+  !> their softening is.
   pure type(reversal_t) function new_reversal(materials, kinematic, blocks) result(reversal)
     type(materials_t), intent(in) :: materials
     logical,           intent(in) :: kinematic(:)
     type(blocks_t),    intent(in) :: blocks
-    logical :: flows(size(kinematic))
+    logical, dimension(size(materials%list)) :: flows, turns_back
     integer, allocatable :: here(:)
     integer :: block, k
 
-    flows = [(materials%list(k)%law%plastic_strain > 0, k=1, size(kinematic))]
+    flows = [(materials%list(k)%law%plastic_strain > 0, k=1, size(flows))]
+    turns_back = .false.   ! what follows those of the input does not flow
+    turns_back(:size(kinematic)) = kinematic
     allocate (reversal%softens(blocks%count))
     do block = 1, blocks%count
       here = materials%runs(materials%first_run(block):materials%first_run(block + 1) - 1)%material
-      reversal%softens(block) = any(kinematic(here)) .and. all(kinematic(here) &
+      reversal%softens(block) = any(turns_back(here)) .and. all(turns_back(here) &
         .or. .not. flows(here))
     end do
   end function new_reversal

@@ -2,11 +2,13 @@
 module pd_setup_body
   use pd_cloud, only: read_cloud
   use pd_errors, only: error_list_t
-  use pd_geometry, only: body_t, lattice_body, lattice_t, layer_t, nearest_count
+  use pd_geometry, only: body_t, lattice_t, layer_t, nearest_count, region_body, shape_t
   use pd_input, only: resolved_path
-  use pd_input_types, only: input_t
+  use pd_input_shapes, only: body_number, circle_error, find_extents, outline
+  use pd_input_types, only: body_input_t, input_t
   use pd_kinds, only: is_set, wp
   use pd_random_field, only: longest_way
+  use pd_text, only: short_number
   implicit none
   private
 
@@ -16,7 +18,8 @@ contains
 
   !> Points, volumes and boundary sets.
   !>
-  !> Errors: a cloud file that is wrong; a body without points, a boundary without points.
+  !> Errors: a cloud file that is wrong; a body or a boundary without points, a hole without
+  !> effect; a weak patch that holds no point.
   subroutine set_up_body(input, body, warnings, input_errors, errors)
     type(input_t),      intent(in)    :: input
     type(body_t),       intent(out)   :: body
@@ -27,8 +30,9 @@ contains
     if (input%bodies(1)%shape == 'file') then
       call cloud_body(input, body, input_errors, errors)
     else
-      call rectangle_body(input, body, warnings, errors)
+      call shaped_body(input, body, warnings, errors)
     end if
+    if (errors%count() + input_errors%count() == 0) call look_at_patch(input, body, errors)
     if (is_set(input%random_field%correlation_length) .and. allocated(body%position)) &
       call look_at_scales(input%random_field%correlation_length, input%discretisation%spacing, &
       maxval(abs(body%position)), warnings, errors)
@@ -73,44 +77,130 @@ contains
     end do
   end subroutine cloud_body
 
-  !> Body from rectangles on one lattice.
-  subroutine rectangle_body(input, body, warnings, errors)
+  !> Check that the weak patch and the random field touch points of the body. Where a material can
+  !> yield, one of these points must.
+  subroutine look_at_patch(input, body, errors)
+    type(input_t),      intent(in)    :: input
+    type(body_t),       intent(in)    :: body
+    type(error_list_t), intent(inout) :: errors
+    logical :: counts(body%n), in_patch(body%n)
+    integer :: i
+
+    counts = body%boundary == 0
+    if (any_yields(input)) then
+      do i = 1, body%n
+        counts(i) = counts(i) .and. yields(input, input%bodies(body%part(i))%material)
+      end do
+    end if
+    if (is_set(input%random_field%coefficient_of_variation) .and. .not. any(counts)) &
+      call errors%add('the random field touches no point that can yield', '&random_field')
+    associate (flaw => input%imperfection)
+      if (.not. flaw%amplitude > 0.0_wp) return
+      do i = 1, body%n
+        in_patch(i) = norm2(body%position(i, :) - [flaw%x, flaw%y]) &
+          <= flaw%radius * (1.0_wp + 1.0e-6_wp)
+      end do
+      if (.not. any(in_patch .and. counts)) call errors%add( &
+        'the weak patch holds no point of the body that can yield', '&imperfection', &
+        short_number(flaw%radius)//' m about '//short_number(flaw%x)//', '// &
+        short_number(flaw%y), 'a patch in the body, wider than the spacing')
+    end associate
+  end subroutine look_at_patch
+
+  !> Whether one of the materials can yield.
+  pure logical function any_yields(input)
+    type(input_t), intent(in) :: input
+    integer :: k
+
+    any_yields = .false.
+    do k = 1, size(input%materials)
+      any_yields = any_yields .or. input%materials(k)%model == 'j2'
+    end do
+  end function any_yields
+
+  !> Whether the material of a name can yield.
+  pure logical function yields(input, name)
+    type(input_t), intent(in) :: input
+    character(*),  intent(in) :: name
+    integer :: k
+
+    yields = .false.
+    do k = 1, size(input%materials)
+      if (input%materials(k)%name == name) yields = input%materials(k)%model == 'j2'
+    end do
+  end function yields
+
+  !> Body from rectangles, polygons and circles on one lattice, which starts at the lower left
+  !> corner of the first one, or of the box around it.
+  subroutine shaped_body(input, body, warnings, errors)
     type(input_t),      intent(in)    :: input
     type(body_t),       intent(out)   :: body
     type(error_list_t), intent(inout) :: warnings, errors
-    real(wp) :: lower(2, size(input%bodies)), upper(2, size(input%bodies))
-    real(wp) :: asked(4 * size(input%bodies)), found(4 * size(input%bodies))
+    type(shape_t)   :: shapes(size(input%bodies))
     type(layer_t)   :: layers(size(input%boundaries))
     type(lattice_t) :: lattice
-    character(120)  :: text
+    real(wp) :: origin(2), upper(2)
+    logical  :: adjusted, known
+    character(120) :: text
     integer :: k
 
-    do k = 1, size(input%bodies)
-      lower(:, k) = [input%bodies(k)%x_min, input%bodies(k)%y_min]
-      upper(:, k) = [input%bodies(k)%x_max, input%bodies(k)%y_max]
-    end do
     associate (d => input%discretisation)
       lattice%spacing = d%spacing
       lattice%cells = d%layout == 'cells'
       lattice%tributary = d%volumes == 'tributary'
-      lattice%rows = ceiling(d%horizon / d%spacing - 1.0e-6_wp)
+      lattice%reach = d%horizon / d%spacing
+      lattice%rows = ceiling(lattice%reach - 1.0e-6_wp)
     end associate
+    call find_extents(input%bodies(:1), lattice%spacing, origin, upper, known)
+    adjusted = .false.
+    do k = 1, size(shapes)
+      call new_shape(input%bodies(k), origin, lattice%spacing, shapes(k), adjusted, errors)
+    end do
+    if (errors%count() > 0) return
     do k = 1, size(layers)
       layers(k)%side = input%boundaries(k)%side
       layers(k)%boundary = k
+      layers(k)%shape = body_number(input, input%boundaries(k)%body)
+      layers(k)%edge = input%boundaries(k)%edge
       if (size(input%boundaries(k)%span) == 2) layers(k)%span = input%boundaries(k)%span
     end do
-    call lattice_body(lower, upper, lattice, layers, body, errors)
-    asked = [(lower(:, k), upper(:, k), k=1, size(lower, 2))]
-    do k = 1, size(asked), 2
-      found(k:k + 1) = lower(:, 1) + lattice%spacing &
-        * real(nearest_count(asked(k:k + 1) - lower(:, 1), lattice%spacing), wp)
-    end do
-    if (any(abs(found - asked) > 1.0e-6_wp * lattice%spacing) .and. errors%count() == 0) then
+    call region_body(shapes, origin, lattice, layers, body, errors)
+    if (adjusted .and. errors%count() == 0) then
       write (text, '(a,4(g0.8,a))') 'the body is adjusted to the spacing: x from ', body%lower(1), &
         ' to ', body%upper(1), ' m, y from ', body%lower(2), ' to ', body%upper(2), ' m'
       call warnings%add(trim(text), '&body')
     end if
-  end subroutine rectangle_body
+  end subroutine shaped_body
+
+  !> The outline of a body in spacings from the origin. Rectangles move to lattice lines; what is
+  !> on a lattice line or in the middle between two but for round-off is so exactly.
+  !>
+  !> Errors: a rectangle thinner than one spacing.
+  subroutine new_shape(given, origin, spacing, shape, adjusted, errors)
+    type(body_input_t), intent(in)    :: given
+    real(wp),           intent(in)    :: origin(2), spacing   !! [m]
+    type(shape_t),      intent(out)   :: shape
+    logical,            intent(inout) :: adjusted             !! a rectangle has been moved
+    type(error_list_t), intent(inout) :: errors
+    real(wp), parameter   :: near = 1.0e-6_wp
+    real(wp), allocatable :: v(:, :), even(:, :)
+
+    v = outline(given, spacing)
+    v = v - spread(origin, 2, size(v, 2))
+    if (given%shape == 'rectangle') then
+      even = real(nearest_count(v, spacing), wp)
+      adjusted = adjusted .or. any(abs(v - even * spacing) > near * spacing)
+      v = even
+      if (any(v(:, 3) <= v(:, 1))) call errors%add('a body is thinner than one spacing', '&body')
+    else
+      v = v / spacing
+      even = 0.5_wp * anint(2.0_wp * v)
+      where (abs(v - even) <= near) v = even
+    end if
+    shape%vertices = v
+    shape%solid = given%role /= 'hole'
+    if (given%shape == 'circle') shape%near = 2.0_wp * circle_error
+    if (allocated(given%name)) shape%name = given%name
+  end subroutine new_shape
 
 end module pd_setup_body

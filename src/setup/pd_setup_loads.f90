@@ -11,10 +11,11 @@ module pd_setup_loads
   use pd_loads, only: load_t
   use pd_model, only: model_t
   use pd_platens, only: new_platens
-  use pd_point_sets, only: boundary_set, lines_below, point_set_t, side_t
+  use pd_point_sets, only: boundary_set, columns_of, lines_below, point_set_t, side_t
   use pd_pressure, only: new_pressure, pressure_t, spread_pressure, surface_t, surface_vectors
   use pd_rigid_support, only: new_rigid_support
   use pd_sides, only: normal_axis, side_number
+  use pd_sliding_support, only: new_sliding_support
   use pd_supports, only: support_t
   use pd_tables, only: new_table
   use pd_text, only: number_text
@@ -68,6 +69,8 @@ contains
     type(model_t), intent(in) :: model
     class(support_t), allocatable, intent(out) :: support
     type(point_set_t) :: set
+    integer, allocatable :: columns(:, :)
+    integer :: c
 
     associate (b => given(k), body => model%body)
       set = boundary_set(b%name, body%boundary, k)
@@ -78,6 +81,16 @@ contains
       else if (size(b%traction) > 0) then
         allocate (support, source=new_loaded_platen(set, taken(b), b%traction, &
           loaded_lengths(given, body%sides(side_number(b%side)), body%boundary), b%ramp_time))
+      else if (b%contact == 'smooth' .and. (size(b%span) > 0 .or. b%edge > 0)) then
+        columns = columns_of(body%boundary, body%place, k, b%axis, &
+          ceiling(model%delta / model%spacing - 1.0e-6_wp))
+        do c = 1, size(columns, 2)
+          where (columns(:, c) > 0) &
+            columns(:, c) = model%operators%storage%row(max(1, columns(:, c)))
+        end do
+        allocate (support, source=new_sliding_support(set, b%axis, &
+          [new_table(b%times, b%velocities_x, b%velocity(1)), &
+           new_table(b%times, b%velocities_y, b%velocity(2))], mass, columns))
       else
         allocate (support, source=new_rigid_support(set, taken(b), &
           [new_table(b%times, b%velocities_x, b%velocity(1)), &
@@ -92,7 +105,7 @@ contains
     logical :: taken(2)
 
     taken = .true.
-    if (boundary%contact == 'smooth') taken = [1, 2] == normal_axis(boundary%side)
+    if (boundary%contact == 'smooth') taken = [1, 2] == boundary%axis
   end function taken
 
   !> Length of a side that carries x and y of a traction [m]: of the body, and of the layers at its

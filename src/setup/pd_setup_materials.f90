@@ -2,16 +2,18 @@
 !>
 !> A new law or strain measure is a module of its own and a line in `new_law` or `new_measure`.
 module pd_setup_materials
+  use pd_bearing, only: new_bearing
   use pd_elastic, only: new_elastic
   use pd_errors, only: error_list_t
   use pd_families, only: horizon_t
   use pd_green_lagrange, only: green_lagrange_t
-  use pd_input_types, only: input_t, material_input_t, stabilisation_input_t
+  use pd_input_types, only: boundary_input_t, input_t, material_input_t, &
+    stabilisation_input_t
   use pd_j2, only: new_j2
   use pd_kinds, only: is_set, wp
   use pd_law, only: law_t
   use pd_logarithmic, only: logarithmic_t
-  use pd_materials, only: divide_into_runs
+  use pd_materials, only: divide_into_runs, material_t
   use pd_measure, only: measure_t
   use pd_model, only: model_t
   use pd_operators, only: control_stiffness
@@ -42,7 +44,7 @@ contains
   subroutine set_up_materials(input, model)
     type(input_t), intent(in)    :: input
     type(model_t), intent(inout) :: model
-    integer,  allocatable :: material_of(:)
+    integer,  allocatable :: law_of(:), material_of(:)
     real(wp), allocatable :: strength(:)
     integer :: k
 
@@ -60,13 +62,50 @@ contains
     associate (parts => material_of_parts(input))
       material_of = parts(model%body%part)
     end associate
-    call divide_into_runs(model%blocks, model%operators%storage%spread(material_of), &
-      model%materials)
+    law_of = material_of
+    call set_up_bearings(input, law_of, model)
+    call divide_into_runs(model%blocks, model%operators%storage%spread(law_of), model%materials)
     call set_up_strength(input, material_of, model%body%position, strength)
     model%strength = model%operators%storage%spread(strength)
     if (input%stabilisation%method == 'silling') &
-      call set_up_control(input%stabilisation%factor, material_of, model)
+      call set_up_control(input%stabilisation%factor, law_of, model)
   end subroutine set_up_materials
+
+  !> The layers of smooth boundaries that hold a part of a side, or an edge, become bearings: one
+  !> for each material that they would continue, behind those of the input.
+  subroutine set_up_bearings(input, law_of, model)
+    type(input_t), intent(in)    :: input
+    integer,       intent(inout) :: law_of(:)      !! index of the material of every point
+    type(model_t), intent(inout) :: model
+    type(material_t), allocatable :: list(:)
+    logical :: here(size(law_of))
+    integer :: j, k, n
+
+    do k = 1, size(input%boundaries)
+      if (.not. is_bearing(input%boundaries(k))) cycle
+      do j = 1, size(input%materials)
+        here = model%body%boundary == k .and. law_of == j
+        if (.not. any(here)) cycle
+        n = size(model%materials%list)
+        allocate (list(n + 1))
+        list(:n) = model%materials%list
+        list(n + 1) = list(j)
+        list(n + 1)%youngs_modulus = 0.0_wp   ! no control: what does not flow would never let it go
+        deallocate (list(n + 1)%law)
+        allocate (list(n + 1)%law, source=new_bearing(input%boundaries(k)%axis, list(j)%law))
+        call move_alloc(list, model%materials%list)
+        where (here) law_of = n + 1
+      end do
+    end do
+  end subroutine set_up_bearings
+
+  !> Whether the layers of a boundary only carry stress across themselves.
+  pure logical function is_bearing(boundary)
+    type(boundary_input_t), intent(in) :: boundary
+
+    is_bearing = boundary%contact == 'smooth' .and. (size(boundary%span) > 0 &
+      .or. boundary%edge > 0)
+  end function is_bearing
 
   !> Index of the material of every &body.
   pure function material_of_parts(input) result(numbers)

@@ -19,7 +19,7 @@ from typing import Any, NoReturn
 
 from ..read.errors import PostError
 from ..version import __version__
-from . import band, compare, contours, curves, info, report, study
+from . import band, compare, contours, curves, geometry, info, report, study
 from .options import Arguments
 
 
@@ -81,6 +81,13 @@ COMMANDS: dict[str, tuple[_Setup, _Action, str, str]] = {
         """\
         perigeo-post animate run.h5
         perigeo-post animate run.h5 --field von_mises --deformed 5 -o run.mp4""",
+    ),
+    "geometry": (
+        geometry.add_options, geometry.carry_out,
+        "the body of an input before it is run: points, boundaries, loads",
+        """\
+        perigeo-post geometry RUN.nml -o body.png
+        perigeo-post geometry RUN.nml --set discretisation.spacing=0.05 --json""",
     ),
     "study": (
         study.add_options, study.carry_out,

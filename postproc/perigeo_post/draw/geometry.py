@@ -1,0 +1,112 @@
+"""The body of an input before it is run: points, fictitious points, loads, patches."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import EllipseCollection
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Circle
+
+from ..read.points import FloatArray
+from ..read.points_file import BODY, ModelPoints
+from .style import COLOURS, DOUBLE, MAX_HEIGHT, MM, new_figure, style
+
+SOIL = ["#C9B79C", "#8C7B65", "#E3D5B8", "#A89078", "#6E6257", "#D9C2A0"]
+BESIDE = 45.0  # width of the legend [mm]
+ARROWS = 25  # of a load, at most
+
+
+def geometry_figure(model: ModelPoints, title: str = "") -> Figure:
+    """Points by material, fictitious points by boundary, loads and patches with their names."""
+    low = model.positions.min(axis=0) - model.spacing
+    high = model.positions.max(axis=0) + model.spacing
+    wide = DOUBLE - BESIDE - 20.0
+    height = min(MAX_HEIGHT, max(55.0, wide * (high[1] - low[1]) / (high[0] - low[0]) + 20.0))
+    with style():
+        figure = new_figure(DOUBLE, height)
+        axes = figure.add_subplot()
+        entries = _draw_points(axes, model, wide * MM * 72.0 / (high[0] - low[0]))
+        for kind, draw in THINGS.items():
+            for k, (name, rows) in enumerate(model.things.get(kind, {}).items()):
+                entries.append(draw(axes, name, rows, k, float((high - low).max())))
+        axes.set_aspect("equal")
+        axes.set_xlim(low[0], high[0])
+        axes.set_ylim(low[1], high[1])
+        axes.margins(0.02)
+        axes.autoscale(enable=None)
+        axes.set_xlabel("x [m]")
+        axes.set_ylabel("y [m]")
+        if title:
+            axes.set_title(title)
+        figure.legend(handles=entries, loc="outside right upper")
+    return figure
+
+
+def _draw_points(axes: Axes, model: ModelPoints, scale: float) -> list[Line2D]:
+    """Draw points as discs as large as their volume; returns the entries of the legend."""
+    entries = []
+    materials, boundaries = np.array(model.materials), np.array(model.boundaries)
+    size = np.sqrt(model.volumes)
+    thin = 0.3 if scale * model.spacing > 4.0 else 0.0
+    body = boundaries == BODY
+    for k, name in enumerate(dict.fromkeys(model.materials)):
+        entries.append(_discs(
+            axes, model.positions[body & (materials == name)], size[body & (materials == name)],
+            SOIL[k % len(SOIL)], name, thin,
+        ))  # fmt: skip
+    names = [name for name in dict.fromkeys(model.boundaries) if name != BODY]
+    for k, name in enumerate(names):
+        here = boundaries == name
+        entries.append(_discs(axes, model.positions[here], 0.6 * size[here],
+                              COLOURS[k % len(COLOURS)], f"boundary {name}", thin))  # fmt: skip
+    return entries
+
+
+def _discs(
+    axes: Axes, places: FloatArray, size: FloatArray, colour: str, name: str, thin: float
+) -> Line2D:
+    axes.add_collection(EllipseCollection(
+        size, size, np.zeros(len(size)), units="x", offsets=places,
+        offset_transform=axes.transData, facecolors=colour, edgecolors="0.3", linewidths=thin,
+    ))  # fmt: skip
+    return Line2D([], [], marker="o", linestyle="none", color=colour,
+                  label=f"{name}, {len(size)} points")  # fmt: skip
+
+
+def _draw_load(axes: Axes, name: str, rows: FloatArray, k: int, extent: float) -> Line2D:
+    """Arrows that end where the load acts, as long as the force of the points in their place."""
+    places, forces = rows[:, :2], rows[:, 2:]
+    whole = forces.sum(axis=0)
+    # the points that carry most of it: one in each line across the surface
+    size = np.hypot(*forces.T)
+    chosen = np.flatnonzero(size >= 0.5 * size.max())
+    chosen = chosen[np.linspace(0, len(chosen) - 1, min(ARROWS, len(chosen))).round().astype(int)]
+    arrows = 0.06 * extent * forces[chosen] / size.max()
+    colour = COLOURS[-1 - k % len(COLOURS)]
+    axes.quiver(
+        *(places[chosen] - arrows).T, *arrows.T, angles="xy", scale_units="xy", scale=1.0,
+        width=0.003, color=colour, zorder=4,
+    )  # fmt: skip
+    total = float(np.hypot(*whole)) / 1e3
+    return Line2D([], [], marker=r"$\downarrow$", linestyle="none", color=colour,
+                  label=f"load {name}, {total:.4g} kN/m")  # fmt: skip
+
+
+def _draw_patch(axes: Axes, name: str, rows: FloatArray, k: int, extent: float) -> Line2D:
+    """A circle about a patch."""
+    for x, y, radius in rows:
+        axes.add_patch(Circle((x, y), max(radius, 0.004 * extent), fill=False, linestyle="--",
+                              linewidth=1.0, color=COLOURS[1 + k], zorder=5))  # fmt: skip
+    return Line2D([], [], linestyle="--", color=COLOURS[1 + k], label=name)
+
+
+# How each kind of line of the file is drawn: name, its rows, number of the name, extent [m].
+# A new kind is an entry here and in read.points_file.NUMBERS.
+THINGS: dict[str, Callable[[Axes, str, FloatArray, int, float], Line2D]] = {
+    "load": _draw_load,
+    "patch": _draw_patch,
+}

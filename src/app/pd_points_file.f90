@@ -1,0 +1,105 @@
+!> The points of a model as text: for whoever wants to see a body before it is run.
+!>
+!> Lines of words separated by blanks; the first word says of what the line is:
+!>
+!>   point X Y VOLUME MATERIAL BOUNDARY      a dash where it belongs to the body
+!>   load NAME X Y FORCE_X FORCE_Y           force at full load [N/m]
+!>   patch NAME X Y RADIUS
+!>
+!> perigeo-post geometry reads it. A new kind of thing that a model holds is one more kind of line.
+module pd_points_file
+  use pd_errors, only: error_list_t
+  use pd_input_types, only: input_t
+  use pd_kinds, only: wp
+  use pd_model, only: model_t
+  use pd_pressure, only: pressure_t
+  use pd_text, only: number_text
+  implicit none
+  private
+
+  public :: write_points
+
+contains
+
+  !> Write the points, loads and patches of a model that is set up.
+  !>
+  !> Errors: the file cannot be written.
+  subroutine write_points(path, input, model, errors)
+    character(*),       intent(in)    :: path
+    type(input_t),      intent(in)    :: input
+    type(model_t),      intent(in)    :: model
+    type(error_list_t), intent(inout) :: errors
+    integer :: status, unit
+
+    open (newunit=unit, file=path, status='replace', action='write', iostat=status)
+    if (status /= 0) then
+      call errors%add('the file cannot be written', path)
+      return
+    end if
+    write (unit, '(a)', iostat=status) '# perigeo points 1: lengths in m, forces in N/m'
+    if (status == 0) call put_points(unit, input, model, status)
+    if (status == 0) call put_loads(unit, model, status)
+    associate (flaw => input%imperfection)
+      if (flaw%amplitude > 0.0_wp .and. status == 0) write (unit, '(a)', iostat=status) &
+        'patch imperfection '//numbers([flaw%x, flaw%y, flaw%radius])
+    end associate
+    if (status /= 0) call errors%add('the file cannot be written', path)
+    close (unit, iostat=status)
+  end subroutine write_points
+
+  subroutine put_points(unit, input, model, status)
+    integer,       intent(in)    :: unit
+    type(input_t), intent(in)    :: input
+    type(model_t), intent(in)    :: model
+    integer,       intent(inout) :: status
+    character(:), allocatable :: boundary
+    integer :: i
+
+    associate (body => model%body)
+      do i = 1, body%n
+        if (status /= 0) return
+        boundary = '-'
+        if (body%boundary(i) > 0) boundary = input%boundaries(body%boundary(i))%name
+        write (unit, '(a)', iostat=status) 'point '// &
+          numbers([body%position(i, 1), body%position(i, 2), body%volume(i)])//' '// &
+          input%bodies(body%part(i))%material//' '//boundary
+      end do
+    end associate
+  end subroutine put_points
+
+  !> The forces of the pressures on their points.
+  subroutine put_loads(unit, model, status)
+    integer,       intent(in)    :: unit
+    type(model_t), intent(in)    :: model
+    integer,       intent(inout) :: status
+    real(wp) :: force(2)
+    integer  :: i, k
+
+    do k = 1, size(model%loads%items)
+      select type (load => model%loads%items(k)%load)
+      class is (pressure_t)
+        do i = 1, size(load%points)
+          if (status /= 0) return
+          force = 0.0_wp
+          force(load%axis) = load%force(i)
+          write (unit, '(a)', iostat=status) 'load '//load%name//' '// &
+            numbers([model%points%position(load%points(i), 1), &
+                     model%points%position(load%points(i), 2), force])
+        end do
+      end select
+    end do
+  end subroutine put_loads
+
+  !> Numbers with blanks between them.
+  pure function numbers(x) result(text)
+    real(wp), intent(in) :: x(:)
+    character(:), allocatable :: text
+    integer :: k
+
+    text = number_text(x(1))
+    do k = 2, size(x)
+      text = text//' '//number_text(x(k))
+    end do
+  end function numbers
+
+end module pd_points_file
