@@ -63,6 +63,8 @@ contains
       call summary%add('bonds', number(bonds)//'; per point '// &
         number(bonds / real(body%n, wp))// &
         ' on average, '//whole(fewest)//' at least')
+      if (model%operators%hidden_bonds > 0) call summary%add('no bonds', &
+        number(real(model%operators%hidden_bonds, wp))//' that would cross air or a cut')
       call add_imbalance(model, summary)
       call summary%add('horizon', number(model%delta)//' m, spacing '// &
         number(model%spacing)//' m: m = '//number(model%delta / model%spacing))

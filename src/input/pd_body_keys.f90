@@ -7,12 +7,13 @@ module pd_body_keys
   implicit none
   private
 
-  public :: discretisation_input_t, body_input_t
+  public :: discretisation_input_t, body_input_t, cut_input_t
 
   type :: discretisation_input_t
     real(wp) :: spacing = unset                        !! [m]
     real(wp) :: horizon = unset                        !! [m]
     character(:), allocatable :: layout, volumes, influence, fit, cloud_weights
+    character(:), allocatable :: families              !! line_of_sight or distance
   contains
     procedure :: visit => visit_discretisation
   end type discretisation_input_t
@@ -27,6 +28,12 @@ module pd_body_keys
   contains
     procedure :: visit => visit_body
   end type body_input_t
+
+  type :: cut_input_t
+    real(wp) :: x(2) = unset, y(2) = unset             !! of both ends [m]
+  contains
+    procedure :: visit => visit_cut
+  end type cut_input_t
 
 contains
 
@@ -58,6 +65,11 @@ contains
       also='conical needs a horizon of at least 1.5 spacing', &
       meaning='weight of a bond of length r: exp(-r^2/horizon^2), 1, or 1 - r/horizon'), &
       self%influence)
+    call visitor%text_key(key_t('families', default='line_of_sight', needs_effect=.true., &
+      choices='line_of_sight distance', &
+      also='line_of_sight for a cloud only with &cut, which distance does not allow', &
+      meaning='points within the horizon that a bond joins: line_of_sight: those whose straight ' &
+      //'line stays in material and crosses no cut; distance: all, across gaps too'), self%families)
     call visitor%text_key(key_t('fit', default='exact', needs_effect=.true., &
       choices='exact nearest', &
       also='only with shape = ''rectangle''', &
@@ -113,5 +125,19 @@ contains
       also='name of a material; not for a hole', &
       meaning='material of the body; a cloud has one for all its points'), self%material)
   end subroutine visit_body
+
+  subroutine visit_cut(self, visitor)
+    class(cut_input_t),   intent(inout) :: self
+    class(key_visitor_t), intent(inout) :: visitor
+    character(*), parameter :: ends = 'the two ends differ; the cut crosses a bond'
+
+    call visitor%group(group_key_t('cut', repeats=.true., &
+      meaning='a straight line that no bond crosses, for slots thinner than a spacing'))
+    call visitor%vector_key(key_t('x', count=2, unit='m', required=.true., also=ends, &
+      meaning='of the first and the second end; points on the cut lie at its left side, as seen ' &
+      //'from the first end to the second'), self%x)
+    call visitor%vector_key(key_t('y', count=2, unit='m', required=.true., also=ends, &
+      meaning='of the same ends, which belong to the cut'), self%y)
+  end subroutine visit_cut
 
 end module pd_body_keys

@@ -92,6 +92,7 @@ contains
     integer :: k
 
     allocate (input%bodies(count_groups(groups, 'body')))
+    allocate (input%cuts(count_groups(groups, 'cut')))
     allocate (input%materials(count_groups(groups, 'material')))
     allocate (input%boundaries(count_groups(groups, 'boundary')))
     allocate (input%pressures(count_groups(groups, 'pressure')))

@@ -34,6 +34,10 @@ contains
       if (errors%count() >= max_problems) return
       call check_body(input, k, group_named(groups, 'body', k, input%path), errors)
     end do
+    do k = 1, size(input%cuts)
+      if (errors%count() >= max_problems) return
+      call check_cut(input, k, group_named(groups, 'cut', k, input%path), errors)
+    end do
     call check_number_of_points(input, groups, errors)
     call check_stabilisation(input, group_named(groups, 'stabilisation', 1, input%path), errors)
   end subroutine check_model
@@ -106,6 +110,9 @@ contains
       call add_useless(group, 'layout', 'on a point cloud', errors)
       call add_useless(group, 'volumes', 'on a point cloud', errors)
       call add_useless(group, 'fit', 'on a point cloud', errors)
+      if (input%discretisation%families == 'line_of_sight' .and. size(input%cuts) == 0) &
+        call add_useless(group, 'families', 'on a point cloud without a &cut: nothing says ' &
+        //'where its air is', errors)
       return
     end if
     call add_useless(group, 'cloud_weights', 'on a lattice', errors)
@@ -184,6 +191,25 @@ contains
     end subroutine check_extent
 
   end subroutine check_body
+
+  !> Cut k: its two ends differ, and families look for it.
+  subroutine check_cut(input, k, group, errors)
+    type(input_t),          intent(in)    :: input
+    integer,                intent(in)    :: k
+    type(namelist_group_t), intent(in)    :: group
+    type(error_list_t),     intent(inout) :: errors
+
+    if (input%discretisation%families == 'distance') call errors%add( &
+      'a cut has no effect where families go by distance alone', where=place_of(group), &
+      found='families = ''distance''', allowed='families = ''line_of_sight''')
+    associate (x => input%cuts(k)%x, y => input%cuts(k)%y, d => input%discretisation)
+      if (.not. (all(is_set(x)) .and. all(is_set(y)) .and. is_set(d%spacing))) return
+      if (hypot(x(2) - x(1), y(2) - y(1)) > lattice_tolerance * d%spacing) return
+      call errors%add('the cut has no length', where=place_of(group), &
+        found='both ends at ('//number_text(x(1))//', '//number_text(y(1))//')', &
+        allowed='two ends that differ')
+    end associate
+  end subroutine check_cut
 
   subroutine check_file(input, file, group, errors)
     type(input_t),          intent(in)    :: input

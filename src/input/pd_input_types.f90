@@ -3,7 +3,7 @@
 !> Every component carries the name of its key. Numbers without a default hold `unset` until the
 !> file gives them; `doc/input.md` says what each means.
 module pd_input_types
-  use pd_body_keys, only: body_input_t, discretisation_input_t
+  use pd_body_keys, only: body_input_t, cut_input_t, discretisation_input_t
   use pd_key_list, only: key_list_t
   use pd_keys, only: key_visitor_t
   use pd_load_keys, only: boundary_input_t, pressure_input_t
@@ -16,7 +16,7 @@ module pd_input_types
   public :: input_t, all_keys
   public :: run_input_t, discretisation_input_t, body_input_t, material_input_t
   public :: boundary_input_t, stabilisation_input_t, integration_input_t, imperfection_input_t
-  public :: random_field_input_t, output_input_t, pressure_input_t
+  public :: random_field_input_t, output_input_t, pressure_input_t, cut_input_t
 
   type :: input_t
     character(:), allocatable    :: path               !! of the input file
@@ -24,6 +24,7 @@ module pd_input_types
     type(run_input_t)            :: run
     type(discretisation_input_t) :: discretisation
     type(body_input_t),     allocatable :: bodies(:)
+    type(cut_input_t),      allocatable :: cuts(:)
     type(material_input_t), allocatable :: materials(:)
     type(boundary_input_t), allocatable :: boundaries(:)
     type(pressure_input_t), allocatable :: pressures(:)
@@ -52,6 +53,9 @@ contains
     do k = 1, size(self%bodies)
       call self%bodies(k)%visit(visitor)
     end do
+    do k = 1, size(self%cuts)
+      call self%cuts(k)%visit(visitor)
+    end do
     do k = 1, size(self%materials)
       call self%materials(k)%visit(visitor)
     end do
@@ -74,7 +78,7 @@ contains
     type(input_t)    :: one_of_each
 
     allocate (one_of_each%bodies(1), one_of_each%materials(1), one_of_each%boundaries(1), &
-              one_of_each%pressures(1))
+              one_of_each%pressures(1), one_of_each%cuts(1))
     call one_of_each%visit(list)
   end function all_keys
 

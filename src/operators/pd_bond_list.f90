@@ -10,6 +10,7 @@ module pd_bond_list
   use pd_families, only: family, horizon_t, influence
   use pd_kinds, only: i8, n_block, wp
   use pd_operators, only: operators_t
+  use pd_sight, only: sight_t
   use pd_storage, only: listed_storage
   implicit none
   private
@@ -42,15 +43,17 @@ contains
   !> Find all families and weigh their bonds.
   !>
   !> Errors: two points coincide; the first few are reported with their positions.
-  subroutine new_bond_list(horizon, position, volume, operators, errors)
+  subroutine new_bond_list(horizon, position, volume, operators, errors, sight)
     type(horizon_t),    intent(in)    :: horizon
     real(wp),           intent(in)    :: position(:, :)  !! X (n,2) [m]
     real(wp),           intent(in)    :: volume(:)       !! V (n) [m^2]
     type(bond_list_t),  intent(out)   :: operators
     type(error_list_t), intent(inout) :: errors
+    type(sight_t), optional, intent(in) :: sight         !! absent: bonds cross air
     type(cells_t) :: cells
     integer, allocatable :: members(:)
     integer :: i, n, n_members, most
+    integer(i8) :: n_hidden
 
     n = size(position, 1)
     operators%n = n
@@ -62,12 +65,16 @@ contains
     allocate (operators%first(n + 1))
 
     operators%first(1) = 1
-    !$omp parallel default(none) shared(n, most, horizon, cells, position, operators) &
-    !$omp private(i, n_members, members)
+    n_hidden = 0_i8
+    !$omp parallel default(none) shared(n, most, horizon, cells, position, operators, sight) &
+    !$omp private(i, n_members, members) reduction(+:n_hidden)
     allocate (members(most))
     !$omp do schedule(static)
     do i = 1, n
       call family(horizon, cells, position, i, members, n_members)
+      n_hidden = n_hidden + int(n_members, i8)
+      if (present(sight)) call sight%leave_out_hidden(i, members, n_members)
+      n_hidden = n_hidden - int(n_members, i8)
       operators%first(i + 1) = int(n_members, i8)
     end do
     !$omp end do
@@ -77,18 +84,20 @@ contains
     do i = 2, n + 1
       operators%first(i) = operators%first(i) + operators%first(i - 1)
     end do
-    call weigh_bonds(horizon, cells, position, volume, operators, errors)
+    operators%hidden_bonds = n_hidden
+    call weigh_bonds(horizon, cells, position, volume, operators, errors, sight)
     if (.not. allocated(operators%weight_sum)) return
     call report_coincident(operators, position, errors)
   end subroutine new_bond_list
 
   !> Fill the bond list, whose length is known already.
-  subroutine weigh_bonds(horizon, cells, position, volume, operators, errors)
+  subroutine weigh_bonds(horizon, cells, position, volume, operators, errors, sight)
     type(horizon_t),   intent(in)    :: horizon
     type(cells_t),     intent(in)    :: cells
     real(wp),          intent(in)    :: position(:, :), volume(:)
     type(bond_list_t), intent(inout) :: operators
     type(error_list_t), intent(inout) :: errors
+    type(sight_t), optional, intent(in) :: sight
     integer, allocatable :: members(:)
     integer     :: i, j, k, n, n_members, most, status
     integer(i8) :: b, n_bonds
@@ -107,12 +116,14 @@ contains
       return
     end if
 
-    !$omp parallel default(none) shared(n, most, horizon, cells, position, volume, operators) &
+    !$omp parallel default(none) &
+    !$omp shared(n, most, horizon, cells, position, volume, operators, sight) &
     !$omp private(i, j, k, b, n_members, members, xi, weight)
     allocate (members(most))
     !$omp do schedule(static)
     do i = 1, n
       call family(horizon, cells, position, i, members, n_members)
+      if (present(sight)) call sight%leave_out_hidden(i, members, n_members)
       operators%weight_sum(i) = 0.0_wp
       do k = 1, n_members
         j = members(k)

@@ -11,17 +11,21 @@
 !>
 !> with u~ = u V / V_0, V_0 = dx^2 (the fields as weighed), and s_i = sum_j omega V_j xi, which
 !> differs from zero only where points are missing or have less than a whole cell. The inner loops
-!> need no test: voids hold zero.
+!> need no test: voids hold zero. What bonds that cross air or a cut have added is taken out again
+!> (`pd_blocked_bonds`).
 !> Source: doc/theory.md, sections 2, 4 and 5.
 module pd_lattice
+  use pd_blocked_bonds, only: blocked_bonds_t, new_blocked_bonds
   use pd_blocks, only: blocks_t
   use pd_columns, only: add_sums, columns_t
   use pd_domain, only: new_domain
   use pd_families, only: horizon_t, influence
   use pd_kinds, only: i8, n_block, wp
-  use pd_offsets, only: columns_of, half_of_offsets
+  use pd_offsets, only: columns_of, half_of_offsets, residual_weights
+  use pd_operator_rows, only: own_part_of_force
   use pd_operators, only: operators_t
   use pd_radial_sums, only: add_radial_sums, new_radial_sums, radial_sums_t
+  use pd_sight, only: sight_t
   use pd_storage, only: lattice_storage, line_start
   implicit none
   private
@@ -43,6 +47,7 @@ module pd_lattice
     real(wp), allocatable, private :: stiffness(:)        !! sum_j omega V_j (c_i + c_j) (n) [N/m^4]
     type(radial_sums_t), private :: residual                !! S without the part of x_i
     real(wp), allocatable, private :: residual_weight(:)  !! of x~_i in S (n) [m^2]
+    type(blocked_bonds_t), allocatable, private :: blocked  !! not allocated: families are whole
   contains
     procedure :: set_control
     procedure :: gradient_sums_block
@@ -60,12 +65,13 @@ module pd_lattice
 contains
 
   !> Offsets, weights and moments.
-  subroutine new_lattice_operators(horizon, spacing, place, volume, operators)
+  subroutine new_lattice_operators(horizon, spacing, place, volume, operators, sight)
     type(horizon_t), intent(in) :: horizon
     real(wp),        intent(in) :: spacing       !! dx [m]
     integer,         intent(in) :: place(:, :)   !! column and row of every point (n,2)
     real(wp),        intent(in) :: volume(:)     !! V of every point (n) [m^2]
     type(lattice_operators_t), intent(out) :: operators
+    type(sight_t), optional, intent(in) :: sight   !! absent: bonds cross air
     integer :: reach, i
 
     operators%storage = lattice_storage(horizon, spacing, place)
@@ -84,6 +90,9 @@ contains
     if (.not. operators%weighs) operators%share_of = anint(operators%share_of)
     operators%domain = new_domain(line_start(operators%storage%row(1)), &
       operators%storage%row(operators%storage%n))
+    if (present(sight)) call new_blocked_bonds(sight, operators%storage, operators%shift, &
+      operators%xi, operators%weight, operators%blocked)
+    if (allocated(operators%blocked)) operators%hidden_bonds = operators%blocked%count
     call weigh(operators)
     if (operators%weighs) then
       allocate (operators%weighed_moment(operators%n, 2), source=0.0_wp)
@@ -142,6 +151,8 @@ contains
           found(i) = found(i) + merge(1, 0, plus > 0.0_wp) + merge(1, 0, minus > 0.0_wp)
         end do
       end do
+      if (allocated(operators%blocked)) &
+        call operators%blocked%recount(lo, hi, share, total, moment, found)
       operators%moment(lo:hi, :) = moment(:hi - lo + 1, :)
       fewest = huge(1)
       poorest = 0
@@ -191,6 +202,7 @@ contains
       call add_sums(self%columns, self%columns%x, lo, hi, w(:, c), g(lo:hi, 2 * c - 1))
       call add_sums(self%columns, self%columns%y, lo, hi, w(:, c), g(lo:hi, 2 * c))
     end do
+    if (allocated(self%blocked)) call self%blocked%take_out_of_gradient(lo, hi, w, g)
   end subroutine gradient_of_shares
 
   !> D[A] of rows lo to hi: f = sum_j omega V_j (A_i + A_j) xi.
@@ -202,30 +214,16 @@ contains
     integer :: c
 
     if (self%weighs) then
-      call add_own_part(lo, hi, self%weighed_moment, a, f)
+      call own_part_of_force(lo, hi, self%weighed_moment, a, f)
     else
-      call add_own_part(lo, hi, self%moment, a, f)
+      call own_part_of_force(lo, hi, self%moment, a, f)
     end if
     do c = 1, 2
       call add_sums(self%columns, self%columns%x, lo, hi, a(:, 2 * c - 1), f(lo:hi, c))
       call add_sums(self%columns, self%columns%y, lo, hi, a(:, 2 * c), f(lo:hi, c))
     end do
+    if (allocated(self%blocked)) call self%blocked%take_out_of_divergence(lo, hi, a, f)
   end subroutine divergence_sums_block
-
-  !> f = A s for rows lo to hi.
-  pure subroutine add_own_part(lo, hi, moment, a, f)
-    integer,  intent(in) :: lo, hi
-    real(wp), intent(in),    contiguous :: moment(:, :)   !! (n,2)
-    real(wp), intent(in),    contiguous :: a(:, :)        !! (n,4)
-    real(wp), intent(inout), contiguous :: f(:, :)        !! out: (n,2)
-    integer :: i
-
-    !$omp simd simdlen(8)
-    do i = lo, hi
-      f(i, 1) = a(i, 1) * moment(i, 1) + a(i, 2) * moment(i, 2)
-      f(i, 2) = a(i, 3) * moment(i, 1) + a(i, 4) * moment(i, 2)
-    end do
-  end subroutine add_own_part
 
   !> Stiffness of the control, and the factor of u_i in Z:
   !> k = c L[share] + L[c share], L by columns, with the point itself.
@@ -246,6 +244,8 @@ contains
       self%stiffness(lo:hi) = c(lo:hi) &
         * (self%weight_sum(lo:hi) + self%own_weight * self%share_of(lo:hi))
       call add_sums(self%columns, self%columns%l, lo, hi, shared, self%stiffness(lo:hi))
+      if (allocated(self%blocked)) &
+        call self%blocked%take_out_of_near(lo, hi, shared, self%stiffness(lo:hi))
     end do
     !$omp end parallel do
   end subroutine set_control
@@ -279,12 +279,15 @@ contains
     do k = 1, 2
       near = 0.0_wp
       call add_sums(self%columns, self%columns%l, lo, hi, w(:, k), near(:n))
+      if (allocated(self%blocked)) call self%blocked%take_out_of_near(lo, hi, w(:, k), near(:n))
       !$omp simd simdlen(8) private(b)
       do i = lo, hi
         b = i - lo + 1
         near(b) = self%control(i) * near(b) - self%stiffness(i) * u(i, k)
       end do
       call add_sums(self%columns, self%columns%l, lo, hi, self%pull(:, k), near(:n))
+      if (allocated(self%blocked)) &
+        call self%blocked%take_out_of_near(lo, hi, self%pull(:, k), near(:n))
       !$omp simd simdlen(8)
       do i = lo, hi
         f(i, k) = f(i, k) + near(i - lo + 1)
@@ -304,6 +307,8 @@ contains
     do k = 1, 2
       call add_radial_sums(self%residual, lo, hi, self%residual_weight, x(:, k), &
         s(:hi - lo + 1, k))
+      if (allocated(self%blocked)) &
+        call self%blocked%take_out_of_residual(lo, hi, x(:, k), s(:hi - lo + 1, k))
     end do
   end subroutine difference_sums_block
 
@@ -314,7 +319,9 @@ contains
     real(wp), allocatable :: nothing(:)
     integer :: block, lo, hi
 
-    self%residual = new_radial_sums(residual_weights(self, falloff), self%storage%stride)
+    self%residual = new_radial_sums(residual_weights(self%xi, self%weight, falloff), &
+      self%storage%stride)
+    if (allocated(self%blocked)) call self%blocked%weigh_residuals(falloff)
     allocate (nothing(self%n), source=0.0_wp)
     self%residual_weight = nothing
     !$omp parallel do schedule(static) default(none) shared(self, nothing) private(block, lo, hi)
@@ -323,28 +330,13 @@ contains
       hi = self%domain%blocks%hi(block)
       call add_radial_sums(self%residual, lo, hi, nothing, self%share_of, &
         self%residual_weight(lo:hi))
+      if (allocated(self%blocked)) &
+        call self%blocked%take_out_of_residual(lo, hi, self%share_of, self%residual_weight(lo:hi))
     end do
     !$omp end parallel do
     where (self%share_of <= 0.0_wp) self%residual_weight = 0.0_wp
     where (self%share_of > 0.0_wp) self%residual_weight = self%residual_weight / self%share_of
   end subroutine weigh_residuals
-
-  !> omega V_0 (1 - a |xi|^2) of columns and rows away; 0 for the point itself, which S leaves out.
-  pure function residual_weights(self, falloff) result(weight)
-    type(lattice_operators_t), intent(in) :: self
-    real(wp), intent(in) :: falloff        !! a [1/m^2]
-    real(wp), allocatable :: weight(:, :)  !! (0:reach,0:reach)
-    integer  :: reach, p, place(2)
-    real(wp) :: spacing
-
-    spacing = minval(self%xi(:, 2), mask=self%xi(:, 2) > 0.0_wp)
-    reach = nint(maxval(self%xi) / spacing)
-    allocate (weight(0:reach, 0:reach), source=0.0_wp)
-    do p = 1, self%n_pairs
-      place = abs(nint(self%xi(p, :) / spacing))
-      weight(place(1), place(2)) = self%weight(p) * (1.0_wp - falloff * sum(self%xi(p, :)**2))
-    end do
-  end function residual_weights
 
   !> K = sum_j omega V_j xi (x) xi.
   subroutine shape_tensor(self, k)
@@ -369,6 +361,7 @@ contains
             k(i, 3) = k(i, 3) + both * xi(p, 1) * xi(p, 2)
           end do
         end do
+        if (allocated(self%blocked)) call self%blocked%reshape_rows(lo, hi, share, k)
       end associate
     end do
     !$omp end parallel do
@@ -419,6 +412,8 @@ contains
     do i = lo, hi
       if (self%share_of(i) <= 0.0_wp) z2(i) = 0.0_wp
     end do
+    if (allocated(self%blocked)) &
+      call self%blocked%recount_zero_energy(lo, hi, self%share_of, u, h, z2)
   end subroutine zero_energy_block
 
   !> Number of directed bonds.
@@ -445,6 +440,7 @@ contains
     if (self%weighs) memory = memory + real(self%n, wp) * 32.0_wp
     if (allocated(self%control)) memory = memory + real(self%n, wp) * 32.0_wp
     if (allocated(self%relaxing)) memory = memory + real(self%n, wp) * 72.0_wp
+    if (allocated(self%blocked)) memory = memory + self%blocked%memory()
   end function memory
 
 end module pd_lattice

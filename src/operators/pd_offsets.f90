@@ -9,7 +9,7 @@ module pd_offsets
   implicit none
   private
 
-  public :: half_of_offsets, columns_of
+  public :: half_of_offsets, columns_of, residual_weights
 
 contains
 
@@ -64,5 +64,23 @@ contains
     end do
     columns = new_columns(weight(:reach, :reach), spacing, stride)
   end function columns_of
+
+  !> omega V_0 (1 - a |xi|^2) of columns and rows away; 0 for the point itself, which S leaves out.
+  pure function residual_weights(xi, weight, falloff) result(residual)
+    real(wp), intent(in) :: xi(:, :)         !! half of the offsets (pairs,2) [m]
+    real(wp), intent(in) :: weight(:)        !! omega V_0 (pairs) [m^2]
+    real(wp), intent(in) :: falloff          !! a [1/m^2]
+    real(wp), allocatable :: residual(:, :)  !! (0:reach,0:reach)
+    integer  :: reach, p, place(2)
+    real(wp) :: spacing
+
+    spacing = minval(xi(:, 2), mask=xi(:, 2) > 0.0_wp)
+    reach = nint(maxval(xi) / spacing)
+    allocate (residual(0:reach, 0:reach), source=0.0_wp)
+    do p = 1, size(weight)
+      place = abs(nint(xi(p, :) / spacing))
+      residual(place(1), place(2)) = weight(p) * (1.0_wp - falloff * sum(xi(p, :)**2))
+    end do
+  end function residual_weights
 
 end module pd_offsets

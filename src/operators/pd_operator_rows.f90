@@ -8,6 +8,7 @@ module pd_operator_rows
   private
 
   public :: times_k_inverse, stress_times_k_inverse, subtract_affine_control, mean_displacement
+  public :: own_part_of_force
 
 contains
 
@@ -66,6 +67,21 @@ contains
       a(i, 4) = a(i, 4) - c(i) * h(i, 4)
     end do
   end subroutine subtract_affine_control
+
+  !> f = A s for rows lo to hi.
+  pure subroutine own_part_of_force(lo, hi, moment, a, f)
+    integer,  intent(in) :: lo, hi
+    real(wp), intent(in),    contiguous :: moment(:, :)   !! (n,2)
+    real(wp), intent(in),    contiguous :: a(:, :)        !! (n,4)
+    real(wp), intent(inout), contiguous :: f(:, :)        !! out: (n,2)
+    integer :: i
+
+    !$omp simd simdlen(8)
+    do i = lo, hi
+      f(i, 1) = a(i, 1) * moment(i, 1) + a(i, 2) * moment(i, 2)
+      f(i, 2) = a(i, 3) * moment(i, 1) + a(i, 4) * moment(i, 2)
+    end do
+  end subroutine own_part_of_force
 
   !> Mean of u over the volume.
   function mean_displacement(blocks, volume, u) result(mean)

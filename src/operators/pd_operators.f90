@@ -21,7 +21,8 @@
 !>
 !> Realisations: `pd_bond_list` for any points, `pd_balanced_list` off lattices, `pd_lattice` on
 !> them. Set-up chooses; nothing else knows which. Each provides the sums G, D, Z and S. Where its
-!> weights leave out the volume of the neighbour, fields are first multiplied by its share.
+!> weights leave out the volume of the neighbour, fields are first multiplied by its share. Families
+!> hold what a point sees (`pd_sight`).
 !> Source: doc/theory.md, sections 2, 4 and 5.
 module pd_operators
   use pd_blocks, only: blocks_t
@@ -45,6 +46,7 @@ module pd_operators
     real(wp), allocatable :: weight_sum(:)                !! W_i = sum_j omega V_j (n) [m^2]
     real(wp), allocatable :: k_inverse(:, :)              !! K^-1 (n,3) xx yy xy [1/m^4]
     real(wp), allocatable :: control(:)                   !! c (n) [N/m^6]; not allocated: none
+    integer(i8) :: hidden_bonds = 0_i8                    !! directed ones that air and cuts leave out
     logical :: sums_whole_control = .false.               !! Z holds the affine part too
     type(relaxing_t), allocatable :: relaxing             !! not allocated: none
     real(wp), allocatable, private :: force_tensor(:, :)  !! A (n,4), weighed [N/m^6]

@@ -11,7 +11,9 @@ module pd_setup
   use pd_model, only: model_t
   use pd_setup_loads, only: set_up_loads, set_up_platens, set_up_supports
   use pd_setup_materials, only: set_up_materials, set_up_points, set_up_relaxing_control
+  use pd_setup_sight, only: look_around
   use pd_shape_tensor, only: invert_shape_tensors
+  use pd_sight, only: sight_t
   implicit none
   private
 
@@ -21,7 +23,7 @@ contains
 
   !> Operators, materials, supports, loads, damping.
   !>
-  !> Errors: points that coincide, families that are too small, no free point, a pressure that acts
+  !> Errors: a cut that crosses no bond, points that coincide, families that are too small, no free point, a pressure that acts
   !> on no point, a platen under a traction with points of different density, a relaxing control of
   !> families whose bonds are all equally long.
   subroutine set_up_model(input, model, errors)
@@ -29,12 +31,15 @@ contains
     type(model_t),      intent(inout) :: model    !! in: with its body
     type(error_list_t), intent(inout) :: errors
     type(horizon_t) :: horizon
+    type(sight_t), allocatable :: sight
 
     model%at_equilibrium = input%integration%method == 'equilibrium'
     model%spacing = input%discretisation%spacing
     model%delta = input%discretisation%horizon
     horizon = new_horizon(model%delta, input%discretisation%influence)
-    call choose_operators(horizon, input%run%operators, model, errors)
+    call look_around(input, horizon, model%body, sight, errors)
+    if (errors%count() > 0) return
+    call choose_operators(horizon, input%run%operators, sight, model, errors)
     if (errors%count() > 0) return
     model%blocks = model%operators%domain%blocks
     call set_up_points(model)
@@ -52,9 +57,10 @@ contains
   end subroutine set_up_model
 
   !> Lattice operators for a body on a lattice, unless a list is asked for; otherwise the bond list.
-  subroutine choose_operators(horizon, form, model, errors)
+  subroutine choose_operators(horizon, form, sight, model, errors)
     type(horizon_t),    intent(in)    :: horizon
     character(*),       intent(in)    :: form   !! auto, lattice or list
+    type(sight_t), allocatable, intent(in) :: sight   !! not allocated: bonds cross air
     type(model_t),      intent(inout) :: model
     type(error_list_t), intent(inout) :: errors
     type(lattice_operators_t), allocatable :: lattice
@@ -63,11 +69,12 @@ contains
     if (allocated(model%body%place) .and. form /= 'list') then
       allocate (lattice)
       call new_lattice_operators(horizon, model%spacing, model%body%place, model%body%volume, &
-        lattice)
+        lattice, sight)
       call move_alloc(lattice, model%operators)
     else
       allocate (list)
-      call new_bond_list(horizon, model%body%position, model%body%volume, list, errors)
+      call new_bond_list(horizon, model%body%position, model%body%volume, list, errors, &
+        sight)
       call move_alloc(list, model%operators)
     end if
   end subroutine choose_operators

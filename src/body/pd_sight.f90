@@ -1,0 +1,195 @@
+!> Which points of a body see each other: bonds cross neither air nor cuts.
+!>
+!> On a lattice the line between two points has to stay in squares that are material. All is whole
+!> numbers there, so round-off decides about no bond:
+!>
+!> - a line along the edge between two squares is inside if one of them is material;
+!> - a line through a corner is inside if it is so before and after it, so material that touches
+!>   at a corner holds together;
+!> - squares of layers count as material.
+!>
+!> Of a cloud nobody knows where its air is; only cuts count there. A cut is a straight line between
+!> two ends, which belong to it. A point on a cut lies at its left side, seen from the first end to
+!> the second. A bond is cut where its points lie at different sides and its line meets the cut.
+!> Source: doc/theory.md, section 1.
+module pd_sight
+  use pd_geometry, only: body_t
+  use pd_kinds, only: wp
+  implicit none
+  private
+
+  public :: sight_t, new_sight
+
+  !> Needed at set-up only.
+  type :: sight_t
+    logical  :: cells = .false.                       !! points stand in the middle of squares
+    integer  :: reach = 0                             !! squares that a family is away, at most
+    real(wp) :: delta = 0.0_wp                        !! horizon [m]
+    integer,  allocatable, private :: place(:, :)     !! of every point (n,2); not for a cloud
+    real(wp), allocatable, private :: position(:, :)  !! X (n,2) [m]
+    logical,  allocatable, private :: filled(:, :)    !! as in body_t
+    integer,  allocatable, private :: holes(:, :)     !! empty squares up to this column and row
+    real(wp), allocatable :: cuts(:, :)               !! x, y, x, y of their ends (4,cuts) [m]
+  contains
+    procedure :: all_clear
+    procedure :: sees
+    procedure :: leave_out_hidden
+    procedure :: crosses
+    procedure :: through_material
+    procedure, private :: empty_squares
+  end type sight_t
+
+contains
+
+  !> Sight in a body.
+  type(sight_t) function new_sight(body, cells, spacing, delta, cuts) result(sight)
+    type(body_t), intent(in) :: body
+    logical,      intent(in) :: cells        !! points stand in the middle of squares
+    real(wp),     intent(in) :: spacing      !! dx [m]
+    real(wp),     intent(in) :: delta        !! horizon [m]
+    real(wp),     intent(in) :: cuts(:, :)   !! x, y, x, y of their ends (4,cuts) [m]
+    integer :: x, y, column
+
+    sight%cells = cells
+    sight%delta = delta
+    allocate (sight%cuts, source=cuts)
+    allocate (sight%position, source=body%position)
+    if (.not. allocated(body%place) .or. .not. allocated(body%filled)) return
+    sight%reach = int(delta / spacing * (1.0_wp + 1.0e-5_wp)) + 1
+    allocate (sight%place, source=body%place)
+    associate (low => lbound(body%filled), high => ubound(body%filled))
+      allocate (sight%filled(low(1):high(1), low(2):high(2)), source=body%filled)
+      allocate (sight%holes(low(1) - 1:high(1), low(2) - 1:high(2)), source=0)
+      do y = low(2), high(2)
+        column = 0
+        do x = low(1), high(1)
+          if (.not. sight%filled(x, y)) column = column + 1
+          sight%holes(x, y) = sight%holes(x, y - 1) + column
+        end do
+      end do
+    end associate
+  end function new_sight
+
+  !> Empty squares in a box of columns and rows; one at least where the box goes beyond the lattice.
+  pure integer function empty_squares(self, low, high) result(found)
+    class(sight_t), intent(in) :: self
+    integer,        intent(in) :: low(2), high(2)
+
+    found = 1
+    if (any(low <= lbound(self%holes)) .or. any(high > ubound(self%holes))) return
+    found = self%holes(high(1), high(2)) - self%holes(low(1) - 1, high(2)) &
+      - self%holes(high(1), low(2) - 1) + self%holes(low(1) - 1, low(2) - 1)
+  end function empty_squares
+
+  !> Whether nothing but material is as near to a point as its family, and no cut.
+  pure logical function all_clear(self, i)
+    class(sight_t), intent(in) :: self
+    integer,        intent(in) :: i
+    integer :: k
+
+    all_clear = .true.
+    if (allocated(self%place)) &
+      all_clear = self%empty_squares(self%place(i, :) - self%reach, &
+      self%place(i, :) + self%reach) == 0
+    do k = 1, size(self%cuts, 2)
+      associate (cut => self%cuts(:, k), x => self%position(i, :), far => 1.001_wp * self%delta)
+        all_clear = all_clear .and. (any(x < min(cut(1:2), cut(3:4)) - far) &
+          .or. any(x > max(cut(1:2), cut(3:4)) + far))
+      end associate
+    end do
+  end function all_clear
+
+  !> Whether the bond between two points stays in material and crosses no cut.
+  pure logical function sees(self, i, j)
+    class(sight_t), intent(in) :: self
+    integer,        intent(in) :: i, j
+    integer :: k
+
+    sees = self%through_material(i, j)
+    do k = 1, size(self%cuts, 2)
+      if (sees) sees = .not. self%crosses(k, i, j)
+    end do
+  end function sees
+
+  !> Take those out of the family of point i that it does not see.
+  pure subroutine leave_out_hidden(self, i, members, n_members)
+    class(sight_t), intent(in)    :: self
+    integer,        intent(in)    :: i
+    integer,        intent(inout) :: members(:)
+    integer,        intent(inout) :: n_members
+    integer :: k, n
+
+    if (self%all_clear(i)) return
+    n = n_members
+    n_members = 0
+    do k = 1, n
+      if (.not. self%sees(i, members(k))) cycle
+      n_members = n_members + 1
+      members(n_members) = members(k)
+    end do
+  end subroutine leave_out_hidden
+
+  !> Whether the line between two points of a lattice stays in squares that are material. Places
+  !> count twice, so that the middle of a square is a whole number.
+  pure logical function through_material(self, i, j) result(inside)
+    class(sight_t), intent(in) :: self
+    integer,        intent(in) :: i, j
+    integer :: a(2), d(2), low(2), high(2), x, y, corner, least, most
+
+    inside = .true.
+    if (.not. allocated(self%place)) return
+    a = 2 * self%place(i, :) + merge(1, 0, self%cells)
+    d = 2 * (self%place(j, :) - self%place(i, :))
+    low = halves(min(a, a + d))
+    high = halves(max(a, a + d) - 1)
+    where (high < low) low = high   ! along an edge: the squares of both sides
+    where (d == 0 .and. modulo(a, 2) == 0) high = low + 1
+    if (self%empty_squares(low, high) == 0) return
+    if (any(d == 0 .and. modulo(a, 2) == 0)) then
+      if (d(1) == 0) inside = all(self%filled(low(1), low(2):high(2)) &
+        .or. self%filled(high(1), low(2):high(2)))
+      if (d(2) == 0) inside = all(self%filled(low(1):high(1), low(2)) &
+        .or. self%filled(low(1):high(1), high(2)))
+      return
+    end if
+    do y = low(2), high(2)
+      do x = low(1), high(1)
+        ! a square is crossed where its corners lie on both sides of the line
+        corner = d(1) * (2 * y - a(2)) - d(2) * (2 * x - a(1))
+        least = corner + min(0, 2 * d(1)) + min(0, -2 * d(2))
+        most = corner + max(0, 2 * d(1)) + max(0, -2 * d(2))
+        if (least < 0 .and. most > 0) inside = inside .and. self%filled(x, y)
+      end do
+    end do
+  end function through_material
+
+  !> Half of a whole number, rounded down.
+  elemental integer function halves(i)
+    integer, intent(in) :: i
+
+    halves = (i - modulo(i, 2)) / 2
+  end function halves
+
+  !> Whether the bond between two points crosses cut k. What is nearer than 1e-6 horizons to the cut
+  !> is on it, so that round-off decides about no bond.
+  pure logical function crosses(self, k, i, j)
+    class(sight_t), intent(in) :: self
+    integer,        intent(in) :: k, i, j
+    real(wp) :: along(2), length, from, to, at(2), part, close
+
+    close = 1.0e-6_wp * self%delta
+    associate (a => self%cuts(1:2, k), b => self%cuts(3:4, k), &
+      x => self%position(min(i, j), :), y => self%position(max(i, j), :))
+      length = norm2(b - a)
+      along = (b - a) / length
+      from = along(1) * (x(2) - a(2)) - along(2) * (x(1) - a(1))   ! to the left of the cut
+      to = along(1) * (y(2) - a(2)) - along(2) * (y(1) - a(1))
+      crosses = (from >= -close) .neqv. (to >= -close)
+      if (.not. crosses) return
+      part = min(1.0_wp, max(0.0_wp, from / (from - to)))
+      at = x + part * (y - x)
+      crosses = abs(dot_product(along, at - a) - 0.5_wp * length) <= 0.5_wp * length + close
+    end associate
+  end function crosses
+
+end module pd_sight
