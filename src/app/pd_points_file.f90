@@ -72,19 +72,16 @@ contains
     integer,       intent(in)    :: unit
     type(model_t), intent(in)    :: model
     integer,       intent(inout) :: status
-    real(wp) :: force(2)
-    integer  :: i, k
+    integer :: i, k
 
     do k = 1, size(model%loads%items)
       select type (load => model%loads%items(k)%load)
       class is (pressure_t)
         do i = 1, size(load%points)
           if (status /= 0) return
-          force = 0.0_wp
-          force(load%axis) = load%force(i)
           write (unit, '(a)', iostat=status) 'load '//load%name//' '// &
             numbers([model%points%position(load%points(i), 1), &
-                     model%points%position(load%points(i), 2), force])
+                     model%points%position(load%points(i), 2), load%force(i, :)])
         end do
       end select
     end do

@@ -124,6 +124,12 @@ contains
       end do
     end associate
     if (.not. allocated(run%model%body%place)) call look_at_cloud(run)
+    do k = 1, size(run%model%loads%items)
+      associate (load => run%model%loads%items(k)%load)
+        if (allocated(load%doubt)) &
+          call run%warnings%add(load%doubt, '&'//load%kind//' name = '//load%name)
+      end associate
+    end do
   end subroutine look_at_model
 
   !> Warn of a cloud of points whose weights or zero-energy modes make stresses too small.

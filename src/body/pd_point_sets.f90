@@ -8,7 +8,7 @@ module pd_point_sets
   implicit none
   private
 
-  public :: point_set_t, side_t, boundary_set, columns_of, lines_below
+  public :: point_set_t, side_t, boundary_set, columns_of
 
   type :: point_set_t
     character(:), allocatable :: name
@@ -82,33 +82,5 @@ contains
     end do
     columns = columns(:, :c)
   end function columns_of
-
-  !> Numbers of the points below each point of a side, it included, 0: none.
-  pure subroutine lines_below(side, position, spacing, count, lines)
-    type(side_t), intent(in) :: side
-    real(wp),     intent(in) :: position(:, :)  !! X (n,2) [m]
-    real(wp),     intent(in) :: spacing         !! dx [m]
-    integer,      intent(in) :: count           !! points in a line
-    integer, allocatable, intent(out) :: lines(:, :)   !! (count, points of the side)
-    integer, allocatable :: line(:)
-    real(wp) :: step                            ! to the next point inwards
-    integer  :: i, j, k
-
-    step = -real(side%outward, wp) * spacing
-    allocate (lines(count, size(side%points)), source=0)
-    associate (x => position, axis => side%axis, along => 3 - side%axis, &
-      first => side%points(1), last => side%points(size(side%points)))
-      allocate (line(0:nint((x(last, along) - x(first, along)) / spacing)), source=0)
-      do k = 1, size(side%points)
-        line(nint((x(side%points(k), along) - x(first, along)) / spacing)) = k
-      end do
-      do i = 1, size(position, 1)
-        j = nint((x(i, axis) - x(first, axis)) / step) + 1
-        k = nint((x(i, along) - x(first, along)) / spacing)
-        if (j < 1 .or. j > count .or. k < 0 .or. k > ubound(line, 1)) cycle
-        if (line(k) > 0) lines(j, line(k)) = i
-      end do
-    end associate
-  end subroutine lines_below
 
 end module pd_point_sets

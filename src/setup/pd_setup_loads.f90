@@ -4,6 +4,8 @@
 !> the body.
 module pd_setup_loads
   use pd_affine_support, only: new_affine_support
+  use pd_edge_weights, only: find_edge_weights
+  use pd_edges, only: edge_t, outline_edges
   use pd_errors, only: error_list_t
   use pd_input_types, only: boundary_input_t, input_t, pressure_input_t
   use pd_kinds, only: wp
@@ -11,8 +13,8 @@ module pd_setup_loads
   use pd_loads, only: load_t
   use pd_model, only: model_t
   use pd_platens, only: new_platens
-  use pd_point_sets, only: boundary_set, columns_of, lines_below, point_set_t, side_t
-  use pd_pressure, only: new_pressure, pressure_t, spread_pressure, surface_t, surface_vectors
+  use pd_point_sets, only: boundary_set, columns_of, point_set_t, side_t
+  use pd_pressure, only: new_pressure, pressure_t, spread_on_side, surface_t, surface_vectors
   use pd_rigid_support, only: new_rigid_support
   use pd_sides, only: normal_axis, side_number
   use pd_sliding_support, only: new_sliding_support
@@ -160,62 +162,59 @@ contains
     type(input_t),      intent(in)    :: input
     type(model_t),      intent(inout) :: model
     type(error_list_t), intent(inout) :: errors
-    real(wp), allocatable :: vectors(:, :)
+    type(surface_t) :: surface
     integer :: k
 
     allocate (model%loads%items(size(input%pressures)))
     if (size(input%pressures) == 0) return
-    allocate (vectors(model%operators%n, 2), source=0.0_wp)
-    call surface_vectors(model%operators, model%points%volume, vectors)
+    call find_surface(input%boundaries, model, surface)
     do k = 1, size(input%pressures)
-      call new_pressure_load(input%pressures(k), input%boundaries, vectors, model, &
-        model%loads%items(k)%load, errors)
+      call new_pressure_load(input%pressures(k), surface, model, model%loads%items(k)%load, errors)
     end do
   end subroutine set_up_loads
 
   !> A pressure on a side of the body.
-  subroutine new_pressure_load(given, boundaries, vectors, model, load, errors)
+  subroutine new_pressure_load(given, surface, model, load, errors)
     type(pressure_input_t), intent(in)    :: given
-    type(boundary_input_t), intent(in)    :: boundaries(:)
-    real(wp),               intent(in)    :: vectors(:, :)   !! N in the rows of fields (n,2) [m]
+    type(surface_t),        intent(in)    :: surface
     type(model_t),          intent(in)    :: model
     class(load_t), allocatable, intent(out) :: load
     type(error_list_t),     intent(inout) :: errors
     type(pressure_t) :: pressure
 
     pressure = new_pressure(given%name, given%side, given%value, given%span, given%ramp_time)
-    call spread_pressure(surface_of(given%side, boundaries, vectors, model), pressure)
+    call spread_on_side(surface, model%body%sides(side_number(given%side)), pressure)
     pressure%points = model%operators%storage%row(pressure%points)
     if (size(pressure%points) == 0) &
       call errors%add('a pressure acts on no point', '&pressure name = '//given%name)
     allocate (load, source=pressure)
   end subroutine new_pressure_load
 
-  !> A side of the body with the points below it and their weights.
-  type(surface_t) function surface_of(name, boundaries, vectors, model) result(surface)
-    character(*),           intent(in) :: name
-    type(boundary_input_t), intent(in) :: boundaries(:)
-    real(wp),               intent(in) :: vectors(:, :)   !! N in the rows of fields (n,2) [m]
-    type(model_t),          intent(in) :: model
-    logical :: components(2)
+  !> The edges of body and layers, and the part of N_i that belongs to each.
+  subroutine find_surface(boundaries, model, surface)
+    type(boundary_input_t), intent(in)    :: boundaries(:)
+    type(model_t),          intent(inout) :: model
+    type(surface_t),        intent(out)   :: surface
+    type(edge_t), allocatable :: edges(:)
+    real(wp),     allocatable :: vectors(:, :)   ! N in the rows of fields (n,2) [m]
     integer :: i
 
+    allocate (vectors(model%operators%n, 2), source=0.0_wp)
+    call surface_vectors(model%operators, model%points%volume, vectors)
     associate (body => model%body)
-      surface%side = body%sides(side_number(name))
       surface%spacing = model%spacing
-      ! families that touch cut ones
-      surface%depth = 2 * ceiling(model%delta / model%spacing - 1.0e-6_wp)
-      call lines_below(surface%side, body%position, model%spacing, 2 * surface%depth + 2, &
-        surface%lines)
-      surface%weights = vectors(model%operators%storage%row, surface%side%axis)
+      surface%delta = model%delta
+      surface%position = body%position
       surface%in_body = body%boundary == 0
-      allocate (surface%slides(body%n), source=.true.)
+      allocate (surface%free(body%n, 2), source=.true.)
       do i = 1, body%n
-        if (body%boundary(i) == 0) cycle
-        components = taken(boundaries(body%boundary(i)))
-        surface%slides(i) = .not. components(surface%side%axis)
+        if (body%boundary(i) > 0) surface%free(i, :) = .not. taken(boundaries(body%boundary(i)))
       end do
+      call outline_edges(body, model%spacing, edges)
+      ! N_i is felt where families touch cut ones
+      call find_edge_weights(edges, body%position, vectors(model%operators%storage%row, :), &
+        surface%free, 2.0_wp * model%delta + model%spacing, model%spacing, surface%weights)
     end associate
-  end function surface_of
+  end subroutine find_surface
 
 end module pd_setup_loads
