@@ -199,6 +199,7 @@ contains
         call history_columns(model, columns)
         call observe(columns, model, state, moment_at(run%clock, model, state, ledger), seen)
         ledger%initial_kinetic_energy = seen%value('kinetic_energy')
+        if (state%has_initial_strain) ledger%initial_strain_energy = seen%value('strain_energy')
         run%checkpoint%clock = run%clock
       end if
       call release_set_up(model)

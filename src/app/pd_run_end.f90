@@ -22,7 +22,7 @@ contains
     type(run_t),     intent(inout) :: run
     type(outcome_t), intent(inout) :: outcome
     type(error_list_t) :: errors
-    character(:), allocatable :: tried
+    character(:), allocatable :: tried, loads
     integer :: row
 
     associate (last => run%increments%last, t => run%clock%time())
@@ -43,9 +43,12 @@ contains
         call record_row(run%record, errors)
       end if
       call record_frame(run%model, run%state, run%record, errors)
+      loads = short_number(loads_at(run%model, t))//' N/m in all'
+      associate (gravity => norm2(run%model%loads%acceleration(t)))
+        if (gravity > 0.0_wp) loads = loads//', with gravity of '//short_number(gravity)//' m/s^2'
+      end associate
       call record_line(run%record, 'limit load: the last equilibrium is at '//short_number(t)// &
-        ' s, under loads of '//short_number(loads_at(run%model, t))//' N/m in all; there is '// &
-        'none at '//tried, errors)
+        ' s, under loads of '//loads//'; there is none at '//tried, errors)
     end associate
     call outcome%end_if_any(errors, exit_file)
     if (.not. outcome%done) call finish_run(run, outcome)

@@ -84,6 +84,7 @@ contains
           ' and '//items(platens%second)%support%name//', '//number(platens%length)//' m apart')
       end associate
       call add_loads(model, summary)
+      call add_probes(model, summary)
       call summary%add('frames', whole(size(schedule%frame_steps))// &
         ' and the unloaded state; history rows '//whole(schedule%rows))
       call summary%add('memory', number(memory(input, model) / 1.0e6_wp)//' MB')
@@ -124,7 +125,7 @@ contains
       'surface; 0 on a lattice')
   end subroutine add_imbalance
 
-  !> The random field, and its statistics in every material that yields.
+  !> The random field, its statistics in every material that yields, and what grows with depth.
   subroutine add_field(input, model, summary)
     type(input_t),   intent(in)    :: input
     type(model_t),   intent(in)    :: model
@@ -132,16 +133,42 @@ contains
     integer :: k
 
     associate (field => input%random_field)
-      if (.not. is_set(field%coefficient_of_variation)) return
-      call summary%add('random field', 'coefficient of variation '// &
+      if (is_set(field%coefficient_of_variation)) call summary%add('random field', 'coefficient of variation '// &
         number(field%coefficient_of_variation)//', correlation length '// &
         number(field%correlation_length)//' m, seed '//whole(field%seed))
+      do k = 1, size(input%materials)
+        associate (given => input%materials(k), several => size(input%materials) > 1)
+          if (abs(given%youngs_modulus_gradient) > 0.0_wp) &
+            call add_stiffness(k, given, several, model, summary)
+          if (model%materials%list(k)%law%plastic_strain > 0 .and. &
+            (is_set(field%coefficient_of_variation) .or. &
+            abs(given%yield_stress_gradient) > 0.0_wp)) &
+            call add_strength(k, given, several, model, summary)
+        end associate
+      end do
     end associate
-    do k = 1, size(input%materials)
-      if (model%materials%list(k)%law%plastic_strain > 0) &
-        call add_strength(k, input%materials(k), size(input%materials) > 1, model, summary)
-    end do
   end subroutine add_field
+
+  !> E of a material over the body.
+  subroutine add_stiffness(k, material, several, model, summary)
+    integer,                intent(in)    :: k          !! number of the material
+    type(material_input_t), intent(in)    :: material
+    logical,                intent(in)    :: several    !! it is not the only one
+    type(model_t),          intent(in)    :: model
+    type(summary_t),        intent(inout) :: summary
+    character(:), allocatable :: of_which
+    logical, allocatable :: inside(:)
+
+    inside = model%materials%rows_of(k, model%operators%n) .and. model%points%in_body > 0.0_wp
+    if (.not. any(inside)) return
+    of_which = ''
+    if (several) of_which = material%name//': '
+    associate (stiffness => model%materials%stiffness)
+      call summary%add('stiffness', of_which//'E from '// &
+        number(material%youngs_modulus * minval(stiffness, mask=inside))//' to '// &
+        number(material%youngs_modulus * maxval(stiffness, mask=inside))//' Pa')
+    end associate
+  end subroutine add_stiffness
 
   !> Yield stress of a material over the body, the weak patch included.
   subroutine add_strength(k, material, several, model, summary)
@@ -193,6 +220,21 @@ contains
     end do
   end subroutine add_loads
 
+  !> Points that the history follows.
+  subroutine add_probes(model, summary)
+    type(model_t),   intent(in)    :: model
+    type(summary_t), intent(inout) :: summary
+    integer :: k
+
+    do k = 1, size(model%probes)
+      associate (probe => model%probes(k), x => model%points%position(model%probes(k)%row, :))
+        call summary%add('probe', probe%name//': point '// &
+          whole(model%operators%storage%point_at(probe%row))//' at ('//number(x(1))//', '// &
+          number(x(2))//') m, '//number(probe%distance)//' m from where it was asked for')
+      end associate
+    end do
+  end subroutine add_probes
+
   !> Memory of a run [bytes]: operators; per row the fields of the state, what does not change at
   !> the points (7 numbers), K^-1 (3), A (4), and what is needed at times: a field of a frame on its
   !> way to the disk (5), the points and a field of a checkpoint likewise (15), the search for the
@@ -201,15 +243,20 @@ contains
     type(input_t), intent(in) :: input
     type(model_t), intent(in) :: model
     type(state_t) :: state
+    integer, parameter :: of_body_force = 3
     integer :: numbers, at_times, k
 
     state%remembered = model%materials%remembered()
+    state%has_initial_strain = is_set(input%initial_stress%k0)
     at_times = 5
     if (input%output%checkpoint_every > 0.0_wp) at_times = at_times + 15
     do k = 1, size(input%materials)
       if (input%materials(k)%strain_measure /= 'small') at_times = max(at_times, 21)
     end do
     numbers = state%numbers_per_point() + 7 + 3 + 4 + at_times
+    if (state%has_initial_strain) numbers = numbers + of_body_force
+    if (size(input%gravity%acceleration) > 0) numbers = numbers + of_body_force
+    if (allocated(model%materials%stiffness)) numbers = numbers + 1
     if (model%at_equilibrium) numbers = numbers + numbers_per_row(state)
     memory = model%operators%memory() + real(model%operators%n, wp) * 8.0_wp * real(numbers, wp)
   end function memory

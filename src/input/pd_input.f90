@@ -1,6 +1,7 @@
 !> From a namelist file to checked values: all mistakes of the file are listed at once.
 module pd_input
   use pd_errors, only: error_list_t
+  use pd_ground_checks, only: check_ground
   use pd_input_checks, only: check_model, resolved_path
   use pd_input_printer, only: write_input
   use pd_input_settings, only: apply_settings, setting_t
@@ -82,6 +83,7 @@ contains
     call check_materials(input, groups, errors)
     call check_motion(input, groups, errors)
     call check_loads(input, groups, errors)
+    call check_ground(input, groups, errors)
   end subroutine read_groups
 
   !> All values of the file, and defaults for the rest.
@@ -96,6 +98,7 @@ contains
     allocate (input%materials(count_groups(groups, 'material')))
     allocate (input%boundaries(count_groups(groups, 'boundary')))
     allocate (input%pressures(count_groups(groups, 'pressure')))
+    allocate (input%probes(count_groups(groups, 'probe')))
     call reader%open(groups, input%path)
     call input%visit(reader)
     call input%run%complete()

@@ -4,6 +4,7 @@
 !> file gives them; `doc/input.md` says what each means.
 module pd_input_types
   use pd_body_keys, only: body_input_t, cut_input_t, discretisation_input_t
+  use pd_ground_keys, only: gravity_input_t, initial_stress_input_t, probe_input_t
   use pd_key_list, only: key_list_t
   use pd_keys, only: key_visitor_t
   use pd_load_keys, only: boundary_input_t, pressure_input_t
@@ -17,6 +18,7 @@ module pd_input_types
   public :: run_input_t, discretisation_input_t, body_input_t, material_input_t
   public :: boundary_input_t, stabilisation_input_t, integration_input_t, imperfection_input_t
   public :: random_field_input_t, output_input_t, pressure_input_t, cut_input_t
+  public :: gravity_input_t, initial_stress_input_t, probe_input_t
 
   type :: input_t
     character(:), allocatable    :: path               !! of the input file
@@ -28,10 +30,13 @@ module pd_input_types
     type(material_input_t), allocatable :: materials(:)
     type(boundary_input_t), allocatable :: boundaries(:)
     type(pressure_input_t), allocatable :: pressures(:)
+    type(gravity_input_t)        :: gravity
+    type(initial_stress_input_t) :: initial_stress
     type(stabilisation_input_t)  :: stabilisation
     type(integration_input_t)    :: integration
     type(imperfection_input_t)   :: imperfection
     type(random_field_input_t)   :: random_field
+    type(probe_input_t), allocatable :: probes(:)
     type(output_input_t)         :: output
     !> Index into `boundaries` of the platens: two boundaries that cover opposite sides whole, with
     !> none on the other two sides; 0, 0 where there are none. The first is 'bottom' or 'left'.
@@ -65,10 +70,15 @@ contains
     do k = 1, size(self%pressures)
       call self%pressures(k)%visit(visitor)
     end do
+    call self%gravity%visit(visitor)
+    call self%initial_stress%visit(visitor)
     call self%stabilisation%visit(visitor)
     call self%integration%visit(visitor)
     call self%imperfection%visit(visitor)
     call self%random_field%visit(visitor)
+    do k = 1, size(self%probes)
+      call self%probes(k)%visit(visitor)
+    end do
     call self%output%visit(visitor)
   end subroutine visit_input
 
@@ -78,7 +88,7 @@ contains
     type(input_t)    :: one_of_each
 
     allocate (one_of_each%bodies(1), one_of_each%materials(1), one_of_each%boundaries(1), &
-              one_of_each%pressures(1), one_of_each%cuts(1))
+              one_of_each%pressures(1), one_of_each%cuts(1), one_of_each%probes(1))
     call one_of_each%visit(list)
   end function all_keys
 

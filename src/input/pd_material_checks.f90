@@ -4,7 +4,7 @@
 !> because the problem has been reported already.
 module pd_material_checks
   use pd_errors, only: error_list_t
-  use pd_input_checks, only: add_missing
+  use pd_input_checks, only: add_missing, add_useless
   use pd_input_types, only: input_t, material_input_t
   use pd_input_values, only: count_groups, did_you_mean, group_named, is_given
   use pd_kinds, only: is_set, wp
@@ -90,6 +90,9 @@ contains
     type(error_list_t),     intent(inout) :: errors
     real(wp) :: h_i, h_k, three_g
 
+    if (.not. (abs(m%youngs_modulus_gradient) > 0.0_wp .or. &
+               abs(m%yield_stress_gradient) > 0.0_wp)) &
+      call add_useless(group, 'reference_y', 'without a gradient', errors)
     ! With 'elastic' plasticity keys are allowed, so that one word switches the model.
     if (m%model /= 'j2') return
     if (.not. is_given(group, 'yield_stress')) &

@@ -20,6 +20,9 @@ module pd_material_keys
     real(wp) :: kinematic_modulus = 0.0_wp             !! H_k [Pa]
     real(wp) :: isotropic_modulus = 0.0_wp             !! H_i [Pa]
     real(wp) :: residual_strength = unset              !! sigma_r [Pa]
+    real(wp) :: youngs_modulus_gradient = 0.0_wp       !! with depth [Pa/m]
+    real(wp) :: yield_stress_gradient = 0.0_wp         !! with depth [Pa/m]
+    real(wp) :: reference_y = unset                    !! [m]; unset: top of the body
   contains
     procedure :: visit => visit_material
   end type material_input_t
@@ -80,6 +83,16 @@ contains
       meaning='strength at which softening stops, sigma_r, in every direction in which the ' &
       //'material goes on flowing; without effect on hardening'), &
       self%residual_strength)
+    call visitor%real_key(key_t('youngs_modulus_gradient', unit='Pa/m', default='0.0', &
+      also='E above 0 at every point', meaning='growth of E with depth below reference_y; ' &
+      //'kinematic_modulus, isotropic_modulus and residual_strength grow in proportion'), &
+      self%youngs_modulus_gradient)
+    call visitor%real_key(key_t('yield_stress_gradient', unit='Pa/m', default='0.0', &
+      also='yield stress above 0 at every point', meaning='growth of the initial yield stress ' &
+      //'with depth below reference_y'), self%yield_stress_gradient)
+    call visitor%real_key(key_t('reference_y', unit='m', stands_for='the top of the body', &
+      needs_effect=.true., also='only with a gradient', meaning='height at which youngs_modulus ' &
+      //'and yield_stress hold; they stay the same above it'), self%reference_y)
   end subroutine visit_material
 
   subroutine visit_imperfection(self, visitor)

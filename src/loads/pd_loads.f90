@@ -19,6 +19,7 @@ module pd_loads
     procedure(add_forces),  deferred :: add_forces
     procedure(work),        deferred :: work
     procedure(description), deferred :: description
+    procedure :: acceleration => no_acceleration
   end type load_t
 
   abstract interface
@@ -60,9 +61,46 @@ module pd_loads
   contains
     procedure :: add_forces => add_all_forces
     procedure :: work => work_of_all
+    procedure :: acceleration => acceleration_of_all
+    procedure :: append
+    procedure :: count => number_of_loads
   end type loads_t
 
 contains
+
+  !> Acceleration that makes the load, as of gravity, at time t [m/s^2]: here there is none.
+  pure function no_acceleration(self, t) result(acceleration)
+    class(load_t), intent(in) :: self
+    real(wp),      intent(in) :: t                 !! [s]
+    real(wp) :: acceleration(2)
+
+    associate (unused => self, unused_t => t)
+    end associate
+    acceleration = 0.0_wp
+  end function no_acceleration
+
+  !> Number of loads.
+  pure integer function number_of_loads(self) result(number)
+    class(loads_t), intent(in) :: self
+
+    number = 0
+    if (allocated(self%items)) number = size(self%items)
+  end function number_of_loads
+
+  !> Add a load behind the others.
+  subroutine append(self, load)
+    class(loads_t), intent(inout) :: self
+    class(load_t),  intent(in)    :: load
+    type(load_item_t), allocatable :: items(:)
+    integer :: k
+
+    allocate (items(size(self%items) + 1))
+    do k = 1, size(self%items)
+      call move_alloc(self%items(k)%load, items(k)%load)
+    end do
+    allocate (items(size(items))%load, source=load)
+    call move_alloc(items, self%items)
+  end subroutine append
 
   !> Add the loads of time t to the force density, in their order.
   pure subroutine add_all_forces(self, volume, t, f)
@@ -89,5 +127,18 @@ contains
       work = work + self%items(k)%load%work(v, t, t_next)
     end do
   end function work_of_all
+
+  !> Acceleration of all loads at time t [m/s^2].
+  pure function acceleration_of_all(self, t) result(acceleration)
+    class(loads_t), intent(in) :: self
+    real(wp),       intent(in) :: t                !! [s]
+    real(wp) :: acceleration(2)
+    integer  :: k
+
+    acceleration = 0.0_wp
+    do k = 1, size(self%items)
+      acceleration = acceleration + self%items(k)%load%acceleration(t)
+    end do
+  end function acceleration_of_all
 
 end module pd_loads

@@ -18,6 +18,9 @@ module pd_law
     real(wp), allocatable :: stress(:, :)    !! conjugate to the strain (n,4) xx yy zz xy [Pa]
     real(wp), allocatable :: history(:, :)   !! what the points remember (n, most of any law)
     real(wp), allocatable :: strength(:)     !! before any flow (n) [Pa]; laws without one ignore it
+    !> Strain before any motion, which is added to that of the measure (n,4) xx yy zz xy; not
+    !> allocated: none.
+    real(wp), allocatable :: initial_strain(:, :)
   end type law_points_t
 
   type, abstract :: law_t

@@ -8,6 +8,7 @@ module pd_materials
   use pd_blocks, only: blocks_t
   use pd_elastic, only: isotropic_stress_block
   use pd_flow, only: flow_t
+  use pd_graded, only: graded_energy_block, graded_heat_block, graded_stress_block
   use pd_kinds, only: n_block, wp
   use pd_labels, only: label_t
   use pd_law, only: law_points_t, law_t
@@ -37,6 +38,8 @@ module pd_materials
     type(material_t), allocatable :: list(:)
     type(run_t),      allocatable :: runs(:)
     integer,          allocatable :: first_run(:)   !! of each block, one past the last (blocks+1)
+    !> Stiffness of the rows over that of their material (n); not allocated: 1 everywhere.
+    real(wp),         allocatable :: stiffness(:)
   contains
     procedure :: remembered
     procedure :: stress_block
@@ -54,6 +57,9 @@ module pd_materials
     procedure :: wave_speed
     procedure :: density_of
     procedure :: rows_of
+    procedure :: material_of
+    procedure :: youngs_modulus_of
+    procedure, private :: law_block
   end type materials_t
 
 contains
@@ -124,10 +130,12 @@ contains
     do k = self%first_run(block), self%first_run(block + 1) - 1
       associate (run => self%runs(k), material => self%list(self%runs(k)%material))
         call material%measure%strain_block(first, run%lo, run%hi, h, p, kept)
+        if (allocated(points%initial_strain)) &
+          call add_strain(first, run%lo, run%hi, points%initial_strain, p)
         if (k == self%first_run(block)) then
-          call material%law%stress_block(first, run%lo, run%hi, p, points, flow)
+          call self%law_block(run, first, p, points, flow)
         else
-          call material%law%stress_block(first, run%lo, run%hi, p, points, part)
+          call self%law_block(run, first, p, points, part)
           call flow%append(part)
         end if
         call material%measure%first_piola_block(first, run%lo, run%hi, h, points%stress, kept, &
@@ -135,6 +143,40 @@ contains
       end associate
     end do
   end subroutine stress_block
+
+  !> The law of one run.
+  pure subroutine law_block(self, run, first, strain, points, flow)
+    class(materials_t), intent(in) :: self
+    type(run_t),        intent(in) :: run
+    integer,            intent(in) :: first
+    real(wp), intent(in) :: strain(n_block, 4)   !! row 1 is row `first`
+    type(law_points_t), intent(inout) :: points
+    type(flow_t),       intent(inout) :: flow
+
+    associate (law => self%list(run%material)%law)
+      if (allocated(self%stiffness)) then
+        call graded_stress_block(law, self%stiffness, [first, run%lo, run%hi], strain, points, flow)
+      else
+        call law%stress_block(first, run%lo, run%hi, strain, points, flow)
+      end if
+    end associate
+  end subroutine law_block
+
+  !> Add a field of strains in rows lo to hi to those of a block.
+  pure subroutine add_strain(first, lo, hi, more, strain)
+    integer,  intent(in) :: first, lo, hi
+    real(wp), intent(in),    contiguous :: more(:, :)   !! xx yy zz xy (n,4)
+    real(wp), intent(inout) :: strain(n_block, 4)       !! row 1 is row `first`
+    integer :: c, i, shift
+
+    shift = 1 - first
+    do c = 1, 4
+      !$omp simd simdlen(8)
+      do i = lo, hi
+        strain(i + shift, c) = strain(i + shift, c) + more(i, c)
+      end do
+    end do
+  end subroutine add_strain
 
   !> First Piola stress of a small displacement of the unloaded elastic body.
   pure subroutine linear_stress_block(self, block, h, p)
@@ -153,6 +195,8 @@ contains
         call isotropic_stress_block(lambda, shear_modulus, first, run%lo, run%hi, strain, stress)
         from = run%lo - first + 1
         to = run%hi - first + 1
+        if (allocated(self%stiffness)) stress(from:to, :) = stress(from:to, :) &
+          * spread(self%stiffness(run%lo:run%hi), 2, 4)
         p(from:to, 1) = stress(from:to, 1)
         p(from:to, 2) = stress(from:to, 4)
         p(from:to, 3) = stress(from:to, 4)
@@ -186,7 +230,14 @@ contains
         after%strength(from:to) = points%strength(run%lo:run%hi)
         reached(from:to, :) = h(run%lo:run%hi, :) + part * dh(run%lo:run%hi, :)
         call material%measure%strain_block(1, from, to, reached, p, kept)
-        call material%law%stress_block(1, from, to, p, after, flow)
+        if (allocated(points%initial_strain)) &
+          p(from:to, :) = p(from:to, :) + points%initial_strain(run%lo:run%hi, :)
+        if (allocated(self%stiffness)) then
+          call graded_stress_block(material%law, self%stiffness(first:run%hi), [1, from, to], p, &
+            after, flow)
+        else
+          call material%law%stress_block(1, from, to, p, after, flow)
+        end if
         call material%measure%first_piola_block(1, from, to, reached, after%stress, kept, p)
       end associate
     end do
@@ -198,15 +249,17 @@ contains
     integer,  intent(in) :: block
     real(wp), intent(in), contiguous :: h(:, :)        !! H (n,4) xx xy yx yy
     real(wp), intent(in), contiguous :: stress(:, :)   !! conjugate stress (n,4) xx yy zz xy [Pa]
-    real(wp) :: lambda, shear_modulus
+    real(wp) :: lambda, shear_modulus, factor
     integer  :: k
 
     largest = 0.0_wp
+    factor = 1.0_wp
     do k = self%first_run(block), self%first_run(block + 1) - 1
       associate (run => self%runs(k), material => self%list(self%runs(k)%material))
         call material%law%lame_constants(lambda, shear_modulus)
+        if (allocated(self%stiffness)) factor = minval(self%stiffness(run%lo:run%hi))
         largest = max(largest, material%measure%stiffening(run%lo, run%hi, h, stress, &
-          lambda + 2.0_wp * shear_modulus))
+          factor * (lambda + 2.0_wp * shear_modulus)))
       end associate
     end do
   end function stiffening
@@ -221,8 +274,14 @@ contains
 
     do k = self%first_run(block), self%first_run(block + 1) - 1
       associate (run => self%runs(k))
-        call self%list(run%material)%law%energy_block( &
-          self%runs(self%first_run(block))%lo, run%lo, run%hi, points, energy)
+        associate (law => self%list(run%material)%law, &
+          rows => [self%runs(self%first_run(block))%lo, run%lo, run%hi])
+          if (allocated(self%stiffness)) then
+            call graded_energy_block(law, self%stiffness, rows, points, energy)
+          else
+            call law%energy_block(rows(1), rows(2), rows(3), points, energy)
+          end if
+        end associate
       end associate
     end do
   end subroutine energy_block
@@ -237,8 +296,14 @@ contains
 
     do k = self%first_run(block), self%first_run(block + 1) - 1
       associate (run => self%runs(k))
-        call self%list(run%material)%law%heat_block( &
-          self%runs(self%first_run(block))%lo, run%lo, run%hi, points, heat)
+        associate (law => self%list(run%material)%law, &
+          rows => [self%runs(self%first_run(block))%lo, run%lo, run%hi])
+          if (allocated(self%stiffness)) then
+            call graded_heat_block(law, self%stiffness, rows, points, heat)
+          else
+            call law%heat_block(rows(1), rows(2), rows(3), points, heat)
+          end if
+        end associate
       end associate
     end do
   end subroutine heat_block
@@ -346,14 +411,18 @@ contains
   !> Largest c_p = sqrt((lambda + 2 G) / rho) of any material that the body has [m/s].
   pure real(wp) function wave_speed(self) result(fastest)
     class(materials_t), intent(in) :: self
-    real(wp) :: lambda, shear_modulus
-    integer  :: k
+    real(wp) :: lambda, shear_modulus, factor
+    integer  :: k, r
 
     fastest = 0.0_wp
     do k = 1, size(self%list)
       if (.not. self%is_used(k)) cycle
       call self%list(k)%law%lame_constants(lambda, shear_modulus)
-      fastest = max(fastest, sqrt((lambda + 2.0_wp * shear_modulus) / self%list(k)%density))
+      factor = 1.0_wp
+      if (allocated(self%stiffness)) factor = maxval([(maxval(self%stiffness( &
+        self%runs(r)%lo:self%runs(r)%hi)), r=1, size(self%runs))], self%runs%material == k)
+      fastest = max(fastest, sqrt(factor * (lambda + 2.0_wp * shear_modulus) &
+        / self%list(k)%density))
     end do
   end function wave_speed
 
@@ -382,5 +451,39 @@ contains
       if (self%runs(r)%material == k) rows(self%runs(r)%lo:self%runs(r)%hi) = .true.
     end do
   end function rows_of
+
+  !> E of some rows.
+  pure function youngs_modulus_of(self, rows) result(youngs_modulus)
+    class(materials_t), intent(in) :: self
+    integer,            intent(in) :: rows(:)
+    real(wp) :: youngs_modulus(size(rows))   !! [Pa]
+    integer  :: i, k
+
+    do i = 1, size(rows)
+      k = self%material_of(rows(i))
+      youngs_modulus(i) = self%list(k)%youngs_modulus
+      if (allocated(self%stiffness)) youngs_modulus(i) = youngs_modulus(i) &
+        * self%stiffness(rows(i))
+    end do
+  end function youngs_modulus_of
+
+  !> The material of a row; runs are in ascending order.
+  pure integer function material_of(self, row) result(k)
+    class(materials_t), intent(in) :: self
+    integer,            intent(in) :: row
+    integer :: low, high, middle
+
+    low = 1
+    high = size(self%runs)
+    do while (low < high)
+      middle = (low + high + 1) / 2
+      if (self%runs(middle)%lo <= row) then
+        low = middle
+      else
+        high = middle - 1
+      end if
+    end do
+    k = self%runs(low)%material
+  end function material_of
 
 end module pd_materials

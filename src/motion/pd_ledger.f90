@@ -13,6 +13,7 @@ module pd_ledger
 
   type :: ledger_t
     real(wp) :: initial_kinetic_energy = 0.0_wp         !! [J/m]
+    real(wp) :: initial_strain_energy = 0.0_wp          !! [J/m]
     real(wp) :: largest_work = 0.0_wp                   !! largest |W| that was noted [J/m]
     real(wp) :: outer_work = 0.0_wp                     !! of supports and loads [J/m]
     real(wp), allocatable :: plastic(:)                 !! dissipated by flow (blocks) [J/m]

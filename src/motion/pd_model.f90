@@ -7,13 +7,20 @@ module pd_model
   use pd_materials, only: materials_t
   use pd_operators, only: operators_t
   use pd_platens, only: platens_t, reference_ends
-  use pd_points, only: points_t
+  use pd_points, only: points_t, probe_t
   use pd_state, only: state_t
   use pd_supports, only: supports_t
   implicit none
   private
 
-  public :: model_t, damping_frame_t, start, damping_frame, release_set_up
+  public :: model_t, damping_frame_t, initial_t, start, damping_frame, release_set_up
+
+  !> Strain, stress and internal forces of a body with an initial stress, before any motion.
+  type :: initial_t
+    real(wp), allocatable :: strain(:, :)    !! xx yy zz xy (n,4)
+    real(wp), allocatable :: stress(:, :)    !! likewise [Pa]
+    real(wp), allocatable :: force(:, :)     !! x y (n,2) [N/m^3]
+  end type initial_t
 
   !> Everything about a run that does not change while it runs, and the supports with the forces of
   !> the present step.
@@ -26,6 +33,8 @@ module pd_model
     type(platens_t)   :: platens
     type(supports_t)  :: supports
     type(loads_t)     :: loads
+    type(initial_t), allocatable :: initial  !! to begin with; not allocated: unloaded
+    type(probe_t),   allocatable :: probes(:)
     real(wp), allocatable :: strength(:)     !! initial strength of the points (n) [Pa]
     real(wp) :: spacing = 0.0_wp             !! dx [m]
     real(wp) :: delta = 0.0_wp               !! horizon [m]
@@ -51,6 +60,7 @@ contains
 
     deallocate (model%body%position, model%body%volume, model%body%part)
     if (allocated(model%body%place)) deallocate (model%body%place)
+    if (allocated(model%initial)) deallocate (model%initial)
   end subroutine release_set_up
 
   !> Velocity at both ends of the frame in which the damping acts, at time t.
@@ -62,7 +72,7 @@ contains
       call reference_ends(model%platens, t, frame%lower, frame%upper)
   end function damping_frame
 
-  !> State at t = 0: undeformed, moving with the frame of the damping, supports with their own
+  !> State at t = 0: undeformed, with the initial stress where there is one, moving with the frame of the damping, supports with their own
   !> velocity; loads without a ramp act already.
   subroutine start(model, state)
     type(model_t), intent(inout) :: model
@@ -70,7 +80,13 @@ contains
     type(damping_frame_t) :: frame
     integer :: k
 
+    state%has_initial_strain = allocated(model%initial)
     call state%allocate(size(model%points%volume), model%materials%remembered())
+    if (state%has_initial_strain) then
+      state%initial_strain = model%initial%strain
+      state%stress = model%initial%stress
+      state%force = model%initial%force
+    end if
     state%strength = model%strength
     frame = damping_frame(model, 0.0_wp)
     do k = 1, 2
@@ -80,6 +96,8 @@ contains
     call model%supports%prescribe(0.0_wp, state%displacement, state%velocity)
     call model%loads%add_forces(model%points%volume, 0.0_wp, state%force)
     call model%supports%share_forces(model%points%volume, 0.0_wp, state%force)
+    if (state%has_initial_strain) &   ! the body leans on them from the start
+      call model%supports%take_reactions(model%points%volume, 0.0_wp, state%force)
     call model%operators%take_in(state%displacement)
   end subroutine start
 

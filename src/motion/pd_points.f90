@@ -4,7 +4,7 @@ module pd_points
   implicit none
   private
 
-  public :: points_t
+  public :: points_t, probe_t
 
   !> A row without a point has volume 0, is not free, and does not belong to the body.
   type :: points_t
@@ -14,5 +14,12 @@ module pd_points
     real(wp), allocatable :: place(:)         !! between the ends of the damping's frame, 0 to 1 (n)
     real(wp), allocatable :: in_body(:)       !! 1: body, 0: fictitious point (n)
   end type points_t
+
+  !> A point whose displacement and stress the history follows.
+  type :: probe_t
+    character(:), allocatable :: name
+    integer  :: row = 0                       !! of the fields
+    real(wp) :: distance = 0.0_wp             !! from where it was asked for [m]
+  end type probe_t
 
 end module pd_points

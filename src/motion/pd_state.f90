@@ -12,8 +12,8 @@ module pd_state
 
   public :: state_t, block_work_t
 
-  !> Fields over all rows, fictitious points included; stress, history and strength belong to the
-  !> laws.
+  !> Fields over all rows, fictitious points included; stress, history, strength and initial
+  !> strain belong to the laws.
   type, extends(law_points_t) :: state_t
     real(wp), allocatable :: displacement(:, :)            !! u (n,2) [m]
     real(wp), allocatable :: velocity(:, :)                !! v (n,2) [m/s]
@@ -21,6 +21,7 @@ module pd_state
     real(wp), allocatable :: displacement_gradient(:, :)   !! H = F - I (n,4) xx xy yx yy
     real(wp), allocatable :: control_memory(:, :)          !! of the relaxing control (n,4) [m]
     type(label_t), allocatable :: remembered(:)            !! columns of the history
+    logical :: has_initial_strain = .false.                !! it is a field of this state
   contains
     procedure :: visit
     procedure :: allocate => allocate_state
@@ -75,6 +76,8 @@ contains
       'gone_x gone_y held_x held_y'), self%control_memory)
     call visitor%field(state_field_t('stress', 'Pa', 'stress conjugate to the strain', tensor), &
       self%stress)
+    if (self%has_initial_strain) call visitor%field(state_field_t('initial_strain', '1', &
+      'strain before any motion, added to that of the motion', tensor), self%initial_strain)
     call visitor%field(state_field_t('strength', 'Pa', 'initial strength', '', &
       kept=.false.), self%strength)
     call visitor%field(state_field_t('history', '', 'what the laws remember', '', &

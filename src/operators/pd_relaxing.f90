@@ -27,6 +27,7 @@ module pd_relaxing
   type :: whole_family_t
     real(wp) :: falloff = 0.0_wp   !! M_2 / M_4 [1/m^2], M_k = sum omega V |xi|^k
     real(wp) :: weight = 0.0_wp    !! W~ = M_0 - M_2^2 / M_4 [m^2]; 0: all bonds equally long
+    real(wp) :: shape = 0.0_wp     !! M_2 / 2: the shape tensor is K = shape I [m^4]
   end type whole_family_t
 
   !> What the control needs at the rows; rows without a point: 0.
@@ -84,6 +85,7 @@ contains
       end do
     end do
     family%falloff = moment(1) / moment(2)
+    family%shape = 0.5_wp * moment(1)
     family%weight = moment(0) - moment(1)**2 / moment(2)
     if (family%weight <= tolerance * moment(0)) family%weight = 0.0_wp
   end function whole_family

@@ -4,9 +4,10 @@
 !> documents loop over it; one more column is a procedure and a call here.
 !> Source: doc/theory.md, section 10.
 module pd_history_columns
+  use pd_ground_columns, only: add_ground_columns
   use pd_kinds, only: block_dot, block_sum, n_block, wp
   use pd_model, only: model_t
-  use pd_observe, only: block_view_t, column_t, largest, mean, row_view_t, smallest, &
+  use pd_observe, only: block_view_t, column_t, largest, mean, noise, row_view_t, smallest, &
     surplus, total
   use pd_unbalanced, only: over
   implicit none
@@ -66,6 +67,7 @@ contains
       'reactions and loads', value=damping_share))
     call add(columns, column_t('time_step', 's', 'time step of the step that ends here', &
       value=time_step))
+    call add_ground_columns(model, columns)
   end subroutine history_columns
 
   subroutine add(columns, column)
@@ -288,7 +290,8 @@ contains
     associate (ledger => row%moment%ledger)
       value = surplus(row%seen, ledger)
       if (abs(value) > 0.0_wp) value = value &
-        / max(abs(row%seen%value('external_work')), ledger%initial_kinetic_energy, abs(value))
+        / max(abs(row%seen%value('external_work')), ledger%initial_kinetic_energy, &
+        noise * ledger%initial_strain_energy, abs(value))
     end associate
   end function energy_error
 

@@ -18,7 +18,7 @@ module pd_observe
 
   public :: moment_t, block_view_t, row_view_t, column_t, observation_t
   public :: total, mean, largest, smallest
-  public :: moment_at, observe, surplus, imbalance, over_work
+  public :: moment_at, observe, surplus, imbalance, over_work, noise
 
   !> When a state is looked at.
   type :: moment_t
@@ -40,6 +40,9 @@ module pd_observe
     real(wp) :: strain(n_block, 4)              !! xx yy zz xy
   end type block_view_t
 
+  !> Energies below this part of an initial strain energy are round-off of it.
+  real(wp), parameter :: noise = 1.0e-9_wp
+
   !> How the parts of the blocks become the value of a column.
   integer, parameter :: total = 1      !! added up
   integer, parameter :: mean = 2       !! added up, over the volume of the body
@@ -57,11 +60,12 @@ module pd_observe
   !> What a column sees that needs no look at the points.
   type :: row_view_t
     type(model_t), pointer :: model => null()
+    type(state_t), pointer :: state => null()
     type(moment_t) :: moment
     type(observation_t) :: seen                 !! columns from blocks, and those before this one
     type(unbalanced_t) :: unbalanced            !! forces
     real(wp) :: control_energy = 0.0_wp         !! stored in the control [J/m]
-    integer  :: boundary = 0, component = 0     !! that the column is about
+    integer  :: boundary = 0, component = 0, probe = 0   !! that the column is about
   end type row_view_t
 
   !> A column of the history: its value comes from the blocks or from elsewhere.
@@ -70,7 +74,7 @@ module pd_observe
     integer :: joined = 0                       !! how, where there are parts of blocks
     procedure(part_of_block), pointer, nopass :: part => null()
     procedure(value_of_row), pointer, nopass :: value => null()
-    integer :: boundary = 0, component = 0      !! that it is about, if it is
+    integer :: boundary = 0, component = 0, probe = 0   !! that it is about, if it is
   end type column_t
 
   abstract interface
@@ -106,7 +110,7 @@ contains
   subroutine observe(columns, model, state, moment, seen)
     type(column_t),        intent(in)    :: columns(:)
     type(model_t), target, intent(in)    :: model
-    type(state_t),         intent(in)    :: state
+    type(state_t), target, intent(in)    :: state
     type(moment_t),        intent(in)    :: moment
     type(observation_t),   intent(out)   :: seen
     type(row_view_t) :: row
@@ -114,6 +118,7 @@ contains
     integer  :: k
 
     row%model => model
+    row%state => state
     row%moment = moment
     call model%operators%control_energy(model%points%volume, state%displacement, &
       state%displacement_gradient, row%control_energy)
@@ -127,6 +132,7 @@ contains
       if (.not. associated(columns(k)%value)) cycle
       row%boundary = columns(k)%boundary
       row%component = columns(k)%component
+      row%probe = columns(k)%probe
       row%seen%values(k) = columns(k)%value(row)
     end do
     seen = row%seen
@@ -225,7 +231,7 @@ contains
     surplus = seen%value('kinetic_energy') + seen%value('strain_energy') &
       + seen%value('plastic_dissipation') + seen%value('damping_dissipation') &
       + seen%value('stabilisation_energy') - ledger%initial_kinetic_energy &
-      - seen%value('external_work')
+      - ledger%initial_strain_energy - seen%value('external_work')
   end function surplus
 
   !> What the balance lacks, over the largest work that was ever done or the initial kinetic energy;
@@ -237,13 +243,15 @@ contains
     imbalance = over_work(surplus(seen, ledger), ledger)
   end function imbalance
 
-  !> An energy over the largest work that was ever done or the initial kinetic energy.
+  !> An energy over the largest work that was ever done or the initial kinetic energy; beside an
+  !> initial stress over its round-off at least.
   pure real(wp) function over_work(energy, ledger)
     real(wp),       intent(in) :: energy   !! [J/m]
     type(ledger_t), intent(in) :: ledger
     real(wp), parameter :: nothing = 1.0e-280_wp   !! [J/m]; keeps the quotient finite
 
-    over_work = energy / max(ledger%largest_work, ledger%initial_kinetic_energy, nothing)
+    over_work = energy / max(ledger%largest_work, ledger%initial_kinetic_energy, &
+      noise * ledger%initial_strain_energy, nothing)
   end function over_work
 
 end module pd_observe

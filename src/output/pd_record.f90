@@ -13,7 +13,7 @@ module pd_record
   use pd_history_columns, only: history_columns
   use pd_input, only: compare_used, used_values
   use pd_input_types, only: input_t
-  use pd_kinds, only: wp
+  use pd_kinds, only: is_set, wp
   use pd_ledger, only: ledger_t
   use pd_model, only: model_t
   use pd_observe, only: column_t, moment_at, moment_t, observation_t, observe
@@ -44,8 +44,8 @@ module pd_record
     integer :: frames = 0                        !! written so far, 000000 among them
   end type record_t
 
-  character(*), parameter :: ledger_names(3) = [character(24) :: 'initial_kinetic_energy', &
-    'largest_work', 'outer_work']
+  character(*), parameter :: ledger_names(4) = [character(24) :: 'initial_kinetic_energy', &
+    'initial_strain_energy', 'largest_work', 'outer_work']
 
 contains
 
@@ -127,6 +127,8 @@ contains
     description%boundary = model%body%boundary
     if (size(model%materials%remembered()) > 0) &
       description%yield_stress = model%strength(model%operators%storage%row)
+    if (allocated(model%materials%stiffness)) description%youngs_modulus = &
+      model%materials%youngs_modulus_of(model%operators%storage%row)
     allocate (character(64) :: description%boundary_names(size(model%supports%items)))
     do k = 1, size(model%supports%items)
       description%boundary_names(k) = model%supports%items(k)%support%name
@@ -244,7 +246,8 @@ contains
     checkpoint%history_rows = record%history%rows
     checkpoint%frames_written = record%frames
     checkpoint%ledger_names = ledger_names
-    checkpoint%ledger = [ledger%initial_kinetic_energy, ledger%largest_work, ledger%outer_work]
+    checkpoint%ledger = [ledger%initial_kinetic_energy, ledger%initial_strain_energy, &
+      ledger%largest_work, ledger%outer_work]
     allocate (checkpoint%ledger_blocks(size(ledger%plastic), 4))
     checkpoint%ledger_blocks(:, 1) = ledger%plastic
     checkpoint%ledger_blocks(:, 2) = ledger%damping
@@ -269,6 +272,7 @@ contains
     character(:), allocatable, intent(out) :: warning
     type(error_list_t), intent(inout) :: file_errors, input_errors
 
+    state%has_initial_strain = is_set(input%initial_stress%k0)
     call read_checkpoint(input%run%output_dir//'/'//input%run%name, checkpoint, state, warning, &
       file_errors)
     if (file_errors%count() > 0) return
@@ -278,8 +282,9 @@ contains
       return
     end if
     ledger%initial_kinetic_energy = checkpoint%ledger(1)
-    ledger%largest_work = checkpoint%ledger(2)
-    ledger%outer_work = checkpoint%ledger(3)
+    ledger%initial_strain_energy = checkpoint%ledger(2)
+    ledger%largest_work = checkpoint%ledger(3)
+    ledger%outer_work = checkpoint%ledger(4)
     ledger%plastic = checkpoint%ledger_blocks(:, 1)
     ledger%damping = checkpoint%ledger_blocks(:, 2)
     ledger%frame_work = checkpoint%ledger_blocks(:, 3)

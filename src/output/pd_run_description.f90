@@ -38,6 +38,7 @@ module pd_run_description
     real(wp), allocatable :: volume(:)         !! (n) [m^2]
     integer,  allocatable :: boundary(:)       !! (n) 0: body, k: boundary k
     real(wp), allocatable :: yield_stress(:)   !! (n) [Pa]; not allocated: a material without one
+    real(wp), allocatable :: youngs_modulus(:) !! (n) [Pa]; not allocated: that of the materials
     character(:), allocatable :: boundary_names(:)
     type(frame_field_t), allocatable :: fields(:)   !! of every frame
     type(column_t),      allocatable :: columns(:)  !! of the history
@@ -121,6 +122,11 @@ contains
       call write_dataset(file, '/points/yield_stress', description%yield_stress, errors)
       call write_label(file, '/points/yield_stress', label_t('', 'Pa', &
       'initial yield stress'), errors)
+    end if
+    if (allocated(description%youngs_modulus)) then
+      call write_dataset(file, '/points/youngs_modulus', description%youngs_modulus, errors)
+      call write_label(file, '/points/youngs_modulus', label_t('', 'Pa', &
+        'Young''s modulus, where it grows with depth'), errors)
     end if
     if (size(description%boundary_names) == 0) return
     call write_dataset(file, '/points/boundary_names', description%boundary_names, errors)

@@ -9,8 +9,12 @@ module pd_setup
   use pd_kinds, only: wp
   use pd_lattice, only: lattice_operators_t, new_lattice_operators
   use pd_model, only: model_t
+  use pd_setup_gradients, only: check_gradients
+  use pd_setup_gravity, only: set_up_gravity
+  use pd_setup_initial_stress, only: set_up_initial_stress
   use pd_setup_loads, only: set_up_loads, set_up_platens, set_up_supports
   use pd_setup_materials, only: set_up_materials, set_up_points, set_up_relaxing_control
+  use pd_setup_probes, only: set_up_probes
   use pd_setup_sight, only: look_around
   use pd_shape_tensor, only: invert_shape_tensors
   use pd_sight, only: sight_t
@@ -23,9 +27,10 @@ contains
 
   !> Operators, materials, supports, loads, damping.
   !>
-  !> Errors: a cut that crosses no bond, points that coincide, families that are too small, no free point, a pressure that acts
-  !> on no point, a platen under a traction with points of different density, a relaxing control of
-  !> families whose bonds are all equally long.
+  !> Errors: a cut that crosses no bond, points that coincide, families that are too small, no free
+  !> point, a pressure that acts on no point, a platen under a traction with points of different density, a relaxing control of
+  !> families whose bonds are all equally long, a gradient that leaves nothing of a material, a
+  !> probe far from the body, an initial stress beyond the yield stress.
   subroutine set_up_model(input, model, errors)
     type(input_t),      intent(in)    :: input
     type(model_t),      intent(inout) :: model    !! in: with its body
@@ -47,13 +52,17 @@ contains
     if (errors%count() > 0) return
     if (.not. allocated(model%body%place)) call balance_cloud(input, model)
     call set_up_materials(input, model)
+    call check_gradients(input, model, errors)
     if (input%stabilisation%method == 'relaxing') &
       call set_up_relaxing_control(input%stabilisation, horizon, model, errors)
     call set_up_supports(input, model, errors)
     call set_up_platens(input, model)
     call set_up_loads(input, model, errors)
+    call set_up_gravity(input, model)
     call set_up_damping(input, model)
+    call set_up_probes(input, model, errors)
     if (.not. any(model%points%free > 0.0_wp)) call errors%add('no point is free to move')
+    if (errors%count() == 0) call set_up_initial_stress(input, horizon, model, errors)
   end subroutine set_up_model
 
   !> Lattice operators for a body on a lattice, unless a list is asked for; otherwise the bond list.

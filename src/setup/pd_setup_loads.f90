@@ -24,7 +24,7 @@ module pd_setup_loads
   implicit none
   private
 
-  public :: set_up_supports, set_up_platens, set_up_loads
+  public :: set_up_supports, set_up_platens, set_up_loads, taken
 
 contains
 

@@ -6,6 +6,7 @@ module pd_setup_materials
   use pd_elastic, only: new_elastic
   use pd_errors, only: error_list_t
   use pd_families, only: horizon_t
+  use pd_geometry, only: body_t
   use pd_green_lagrange, only: green_lagrange_t
   use pd_input_types, only: boundary_input_t, input_t, material_input_t, &
     stabilisation_input_t
@@ -19,6 +20,7 @@ module pd_setup_materials
   use pd_operators, only: control_stiffness
   use pd_random_field, only: lognormal, new_random_field, standard_normal
   use pd_relaxing, only: new_relaxing, whole_family, whole_family_t
+  use pd_setup_gradients, only: set_up_stiffness, stiffness_of_points, yield_stress_at
   use pd_small_strain, only: small_strain_t
   implicit none
   private
@@ -65,7 +67,8 @@ contains
     law_of = material_of
     call set_up_bearings(input, law_of, model)
     call divide_into_runs(model%blocks, model%operators%storage%spread(law_of), model%materials)
-    call set_up_strength(input, material_of, model%body%position, strength)
+    call set_up_stiffness(input, material_of, model)
+    call set_up_strength(input, material_of, model%body, strength)
     model%strength = model%operators%storage%spread(strength)
     if (input%stabilisation%method == 'silling') &
       call set_up_control(input%stabilisation%factor, law_of, model)
@@ -155,8 +158,8 @@ contains
 
     associate (storage => model%operators%storage)
       allocate (c(storage%n))
-      c = control_stiffness(factor, model%materials%list(material_of)%youngs_modulus, &
-        model%delta, model%operators%weight_sum(storage%row))
+      c = control_stiffness(factor, model%materials%list(material_of)%youngs_modulus &
+        * stiffness_of_points(model), model%delta, model%operators%weight_sum(storage%row))
       call model%operators%set_control(storage%spread(c))
     end associate
   end subroutine set_up_control
@@ -194,6 +197,8 @@ contains
         youngs_modulus(run%lo:run%hi) = model%materials%list(run%material)%youngs_modulus
       end associate
     end do
+    if (allocated(model%materials%stiffness)) &
+      youngs_modulus = youngs_modulus * model%materials%stiffness
     call model%operators%set_relaxing(new_relaxing(family, model%points%volume, youngs_modulus, &
       model%delta, given%relaxing_stiffness, given%relaxing_strain, turns), &
       model%points%position)
@@ -201,20 +206,21 @@ contains
 
   !> sigma_y0 of every point: that of its material or a random field about it, reduced in the weak
   !> patch.
-  subroutine set_up_strength(input, material_of, position, strength)
+  subroutine set_up_strength(input, material_of, body, strength)
     type(input_t), intent(in)  :: input
     integer,       intent(in)  :: material_of(:)             !! of every point
-    real(wp),      intent(in),  contiguous :: position(:, :)    !! X (n,2) [m]
+    type(body_t),  intent(in)  :: body
     real(wp),      intent(out), contiguous :: strength(:)       !! (n) [Pa]
     real(wp) :: mean
     integer  :: i
 
-    associate (field => input%random_field, flaw => input%imperfection)
+    associate (field => input%random_field, flaw => input%imperfection, &
+      position => body%position)
       strength = 0.0_wp
       if (is_set(field%coefficient_of_variation)) call standard_normal( &
         new_random_field(field%correlation_length, field%seed), position, strength)
       do i = 1, size(strength)
-        mean = max(0.0_wp, input%materials(material_of(i))%yield_stress)
+        mean = yield_stress_at(input%materials(material_of(i)), position(i, 2), body%upper(2))
         if (is_set(field%coefficient_of_variation)) then
           strength(i) = lognormal(mean, field%coefficient_of_variation, strength(i))
         else

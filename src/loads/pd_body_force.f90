@@ -1,0 +1,119 @@
+!> Body force: a dead load per volume on all points, as gravity is.
+!>
+!>   f <- f + r(t) b
+!>
+!> Source: doc/theory.md, section 7.
+module pd_body_force
+  use pd_kinds, only: wp
+  use pd_loads, only: load_t
+  use pd_ranks, only: ranks_t
+  use pd_tables, only: new_ramp, table_t
+  use pd_text, only: short_number
+  implicit none
+  private
+
+  public :: body_force_t, new_body_force
+
+  type, extends(load_t) :: body_force_t
+    real(wp), allocatable :: density(:, :)        !! b at full load (n,2) [N/m^3]
+    type(table_t) :: factor                       !! r
+    real(wp) :: full_acceleration(2) = 0.0_wp     !! that makes b; 0: none does [m/s^2]
+    logical,  private :: acts(2) = .false.        !! components in which b is not 0 everywhere
+    real(wp), allocatable, private :: volume(:)   !! V (n) [m^2]
+    real(wp), private :: ramp_time = 0.0_wp       !! full load from then on [s]
+    character(:), allocatable, private :: text    !! what it is
+  contains
+    procedure :: add_forces
+    procedure :: work
+    procedure :: description
+    procedure :: acceleration
+    procedure :: total
+  end type body_force_t
+
+contains
+
+  !> Body force on rows with these volumes.
+  pure type(body_force_t) function new_body_force(kind, density, volume, ramp_time, acceleration, &
+    text) result(load)
+    character(*), intent(in) :: kind              !! in a word
+    real(wp),     intent(in) :: density(:, :)     !! b at full load (n,2) [N/m^3]
+    real(wp),     intent(in) :: volume(:)         !! V (n) [m^2]
+    real(wp),     intent(in) :: ramp_time         !! full load from then on [s]
+    real(wp),     intent(in) :: acceleration(2)   !! that makes b; 0: none does [m/s^2]
+    character(*), intent(in) :: text              !! what it is
+
+    load%name = kind
+    load%kind = kind
+    load%text = text
+    allocate (load%density(size(density, 1), 2), source=density)
+    allocate (load%volume(size(volume)), source=volume)
+    load%acts = [any(abs(density(:, 1)) > 0.0_wp), any(abs(density(:, 2)) > 0.0_wp)]
+    load%ramp_time = ramp_time
+    load%factor = new_ramp(ramp_time)
+    load%full_acceleration = acceleration
+  end function new_body_force
+
+  !> f <- f + r b.
+  pure subroutine add_forces(self, volume, t, f)
+    class(body_force_t), intent(in)    :: self
+    real(wp),            intent(in)    :: volume(:), t
+    real(wp),            intent(inout) :: f(:, :)
+    real(wp) :: factor
+    integer  :: c, i
+
+    associate (unused => volume)
+    end associate
+    factor = self%factor%rate(t)
+    do c = 1, 2
+      if (.not. self%acts(c)) cycle
+      associate (density => self%density)
+        do i = 1, size(f, 1)
+          f(i, c) = f(i, c) + factor * density(i, c)
+        end do
+      end associate
+    end do
+  end subroutine add_forces
+
+  pure real(wp) function work(self, v, t, t_next)
+    class(body_force_t), intent(in) :: self
+    real(wp),            intent(in) :: v(:, :), t, t_next
+    real(wp) :: power
+    integer  :: c
+    type(ranks_t) :: ranks
+
+    power = 0.0_wp
+    do c = 1, 2
+      if (self%acts(c)) power = power + ranks%total(self%volume * self%density(:, c) * v(:, c))
+    end do
+    work = (t_next - t) * (0.5_wp * (self%factor%rate(t) + self%factor%rate(t_next))) * power
+  end function work
+
+  !> Force in all at full load [N/m].
+  pure function total(self) result(force)
+    class(body_force_t), intent(in) :: self
+    real(wp) :: force(2)
+    type(ranks_t) :: ranks
+
+    force = [ranks%total(self%volume * self%density(:, 1)), &
+      ranks%total(self%volume * self%density(:, 2))]
+  end function total
+
+  pure function acceleration(self, t)
+    class(body_force_t), intent(in) :: self
+    real(wp),            intent(in) :: t
+    real(wp) :: acceleration(2)
+
+    acceleration = self%factor%rate(t) * self%full_acceleration
+  end function acceleration
+
+  pure function description(self) result(text)
+    class(body_force_t), intent(in) :: self
+    character(:), allocatable :: text
+    real(wp) :: force(2)
+
+    force = self%total()
+    text = self%text//': '//short_number(force(1))//', '//short_number(force(2))//' N/m in all'
+    if (self%ramp_time > 0.0_wp) text = text//', whole from '//short_number(self%ramp_time)//' s'
+  end function description
+
+end module pd_body_force

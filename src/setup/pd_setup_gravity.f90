@@ -1,0 +1,61 @@
+!> From checked input to the weight of the points.
+!>
+!> Source: doc/theory.md, section 7.
+module pd_setup_gravity
+  use pd_body_force, only: new_body_force
+  use pd_input_types, only: input_t
+  use pd_kinds, only: wp
+  use pd_model, only: model_t
+  use pd_setup_loads, only: taken
+  use pd_text, only: short_number
+  implicit none
+  private
+
+  public :: set_up_gravity
+
+contains
+
+  !> b = rho g on all points. Those of a boundary have none in the components in which it transfers
+  !> forces: they are moved there, and their weight would only come back as a reaction. Where they
+  !> slide they stand for a body that goes on, and carry their own weight.
+  subroutine set_up_gravity(input, model)
+    type(input_t), intent(in)    :: input
+    type(model_t), intent(inout) :: model
+    real(wp), allocatable :: density(:, :), mass(:)
+    character(:), allocatable :: text
+    real(wp) :: layers(2)
+    integer  :: c, n
+
+    associate (g => input%gravity%acceleration, points => model%points)
+      if (size(g) == 0) return
+      n = model%operators%n
+      allocate (mass(n), source=model%materials%density_of(n))
+      allocate (density(n, 2), &
+        source=model%operators%storage%spread(carries(input, model%body%boundary)))
+      do c = 1, 2
+        density(:, c) = density(:, c) * (mass * g(c))
+        layers(c) = sum((1.0_wp - points%in_body) * points%volume * density(:, c))
+      end do
+      text = short_number(g(1))//', '//short_number(g(2))//' m/s^2'
+      if (any(abs(layers) > 0.0_wp)) text = text//', layers that slide have '// &
+        short_number(layers(1))//', '//short_number(layers(2))//' N/m of it'
+      call model%loads%append(new_body_force('gravity', density, points%volume, &
+        input%gravity%ramp_time, g, text))
+    end associate
+  end subroutine set_up_gravity
+
+  !> 1 where a point carries its own weight.
+  pure function carries(input, boundary) result(mask)
+    type(input_t), intent(in) :: input
+    integer,       intent(in) :: boundary(:)   !! of every point, 0: body
+    real(wp) :: mask(size(boundary), 2)
+    integer  :: i
+
+    mask = 1.0_wp
+    do i = 1, size(boundary)
+      if (boundary(i) == 0) cycle
+      where (taken(input%boundaries(boundary(i)))) mask(i, :) = 0.0_wp
+    end do
+  end function carries
+
+end module pd_setup_gravity
