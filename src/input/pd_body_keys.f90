@@ -18,6 +18,7 @@ module pd_body_keys
   end type discretisation_input_t
 
   type :: body_input_t
+    character(:), allocatable :: name
     character(:), allocatable :: shape, file           !! file: as in the input, relative to it
     character(:), allocatable :: material              !! name of one of the materials
     real(wp) :: x_min = unset, x_max = unset, y_min = unset, y_max = unset   !! [m]
@@ -73,6 +74,8 @@ contains
 
     call visitor%group(group_key_t('body', required=.true., repeats=.true., &
       meaning='where there is material'))
+    call visitor%text_key(key_t('name', is_name=.true., stands_for='none', &
+      also='each name once', meaning='name by which stages call the body'), self%name)
     call visitor%text_key(key_t('shape', default='rectangle', choices='rectangle file', &
       also='file: as the only body', &
       meaning='rectangle: a lattice of points; file: a cloud of points from a text file'), &

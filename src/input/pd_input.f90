@@ -14,6 +14,7 @@ module pd_input
   use pd_namelist, only: scan_namelist
   use pd_namelist_groups, only: namelist_group_t
   use pd_platen_checks, only: platens_of
+  use pd_stage_checks, only: check_stages
   use pd_text_file, only: read_text_file
   use pd_used_values, only: compare_used, used_values
   implicit none
@@ -79,6 +80,7 @@ contains
     call check_materials(input, groups, errors)
     call check_motion(input, groups, errors)
     call check_loads(input, groups, errors)
+    call check_stages(input, groups, errors)
   end subroutine read_groups
 
   !> All values of the file, and defaults for the rest.
@@ -92,6 +94,8 @@ contains
     allocate (input%materials(count_groups(groups, 'material')))
     allocate (input%boundaries(count_groups(groups, 'boundary')))
     allocate (input%pressures(count_groups(groups, 'pressure')))
+    allocate (input%stages(count_groups(groups, 'stage')))
+    allocate (input%strength_reduction(min(1, count_groups(groups, 'strength_reduction'))))
     call reader%open(groups, input%path)
     call input%visit(reader)
     call input%run%complete()
@@ -101,6 +105,9 @@ contains
         input%bodies(k)%material = input%materials(1)%name
     end do
     input%platens = platens_of(input%boundaries)
+    if (size(input%stages) == 0) return
+    input%platens = 0   ! which are there changes
+    input%integration%end_time = input%stages(size(input%stages))%end_time
   end subroutine fill
 
 end module pd_input

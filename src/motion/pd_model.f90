@@ -9,6 +9,7 @@ module pd_model
   use pd_platens, only: platens_t, reference_ends
   use pd_points, only: points_t
   use pd_state, only: state_t
+  use pd_storage, only: storage_t
   use pd_supports, only: supports_t
   implicit none
   private
@@ -19,6 +20,8 @@ module pd_model
   !> the present step.
   type :: model_t
     type(body_t)      :: body
+    type(body_t)      :: whole               !! points of all stages; n = 0: there are no stages
+    type(storage_t)   :: shown               !! rows of the points that results show
     class(operators_t), allocatable :: operators
     type(materials_t) :: materials
     type(blocks_t)    :: blocks              !! of the rows of all fields
@@ -30,6 +33,7 @@ module pd_model
     real(wp) :: spacing = 0.0_wp             !! dx [m]
     real(wp) :: delta = 0.0_wp               !! horizon [m]
     real(wp) :: damping = 0.0_wp             !! C [kg/(m^3 s)]
+    logical  :: releases = .false.           !! a stage lets in what it has changed
     logical  :: at_equilibrium = .false.     !! time only tells how far loads and supports are
     logical  :: damped_in_frame = .false.    !! damping acts in the frame of the platens
     real(wp) :: highest_frequency = 0.0_wp   !! of the linearised operator [1/s]; 0: not asked for
@@ -70,6 +74,7 @@ contains
     type(damping_frame_t) :: frame
     integer :: k
 
+    state%in_stages = model%whole%n > 0
     call state%allocate(size(model%points%volume), model%materials%remembered())
     state%strength = model%strength
     frame = damping_frame(model, 0.0_wp)

@@ -12,6 +12,8 @@ module pd_setup
   use pd_setup_loads, only: set_up_loads, set_up_platens, set_up_supports
   use pd_setup_materials, only: set_up_materials, set_up_points, set_up_relaxing_control
   use pd_shape_tensor, only: invert_shape_tensors
+  use pd_stages, only: stage_t, stages_of
+  use pd_storage, only: lattice_storage
   implicit none
   private
 
@@ -24,12 +26,18 @@ contains
   !> Errors: points that coincide, families that are too small, no free point, a pressure that acts
   !> on no point, a platen under a traction with points of different density, a relaxing control of
   !> families whose bonds are all equally long.
-  subroutine set_up_model(input, model, errors)
+  subroutine set_up_model(input, model, errors, stage)
     type(input_t),      intent(in)    :: input
     type(model_t),      intent(inout) :: model    !! in: with its body
     type(error_list_t), intent(inout) :: errors
+    type(stage_t), optional, intent(in) :: stage  !! absent: the first
+    type(stage_t) :: present_stage
     type(horizon_t) :: horizon
 
+    associate (stages => stages_of(input))
+      present_stage = stages(1)
+    end associate
+    if (present(stage)) present_stage = stage
     model%at_equilibrium = input%integration%method == 'equilibrium'
     model%spacing = input%discretisation%spacing
     model%delta = input%discretisation%horizon
@@ -37,16 +45,18 @@ contains
     call choose_operators(horizon, input%run%operators, model, errors)
     if (errors%count() > 0) return
     model%blocks = model%operators%domain%blocks
+    model%shown = model%operators%storage
+    if (model%whole%n > 0) model%shown = lattice_storage(horizon, model%spacing, model%whole%place)
     call set_up_points(model)
     call invert_shape_tensors(model%operators, model%points%position, model%points%volume, errors)
     if (errors%count() > 0) return
     if (.not. allocated(model%body%place)) call balance_cloud(input, model)
-    call set_up_materials(input, model)
+    call set_up_materials(input, present_stage, model)
     if (input%stabilisation%method == 'relaxing') &
       call set_up_relaxing_control(input%stabilisation, horizon, model, errors)
-    call set_up_supports(input, model, errors)
+    call set_up_supports(input, present_stage, model, errors)
     call set_up_platens(input, model)
-    call set_up_loads(input, model, errors)
+    call set_up_loads(input, present_stage, model, errors)
     call set_up_damping(input, model)
     if (.not. any(model%points%free > 0.0_wp)) call errors%add('no point is free to move')
   end subroutine set_up_model
@@ -63,7 +73,7 @@ contains
     if (allocated(model%body%place) .and. form /= 'list') then
       allocate (lattice)
       call new_lattice_operators(horizon, model%spacing, model%body%place, model%body%volume, &
-        lattice)
+        lattice, model%body%box)
       call move_alloc(lattice, model%operators)
     else
       allocate (list)

@@ -18,6 +18,7 @@ module pd_setup_materials
   use pd_random_field, only: lognormal, new_random_field, standard_normal
   use pd_relaxing, only: new_relaxing, whole_family, whole_family_t
   use pd_small_strain, only: small_strain_t
+  use pd_stages, only: stage_t
   implicit none
   private
 
@@ -31,6 +32,7 @@ contains
 
     associate (points => model%points, body => model%body, storage => model%operators%storage)
       points%position = storage%spread(body%position)
+      if (model%whole%n > 0) points%position = model%shown%spread(model%whole%position)
       points%volume = storage%spread(body%volume)
       points%in_body = storage%spread(merge(1.0_wp, 0.0_wp, body%boundary == 0))
       points%free = spread(storage%spread(spread(1.0_wp, 1, body%n)), 2, 2)
@@ -39,8 +41,9 @@ contains
   end subroutine set_up_points
 
   !> Materials, initial strength, zero-energy control.
-  subroutine set_up_materials(input, model)
+  subroutine set_up_materials(input, stage, model)
     type(input_t), intent(in)    :: input
+    type(stage_t), intent(in)    :: stage
     type(model_t), intent(inout) :: model
     integer,  allocatable :: material_of(:)
     real(wp), allocatable :: strength(:)
@@ -57,9 +60,7 @@ contains
       end associate
     end do
     allocate (material_of(model%body%n), strength(model%body%n))
-    associate (parts => material_of_parts(input))
-      material_of = parts(model%body%part)
-    end associate
+    material_of = stage%material_of(model%body%part)
     call divide_into_runs(model%blocks, model%operators%storage%spread(material_of), &
       model%materials)
     call set_up_strength(input, material_of, model%body%position, strength)
@@ -67,18 +68,6 @@ contains
     if (input%stabilisation%method == 'silling') &
       call set_up_control(input%stabilisation%factor, material_of, model)
   end subroutine set_up_materials
-
-  !> Index of the material of every &body.
-  pure function material_of_parts(input) result(numbers)
-    type(input_t), intent(in) :: input
-    integer :: numbers(size(input%bodies)), j, k
-
-    do k = 1, size(numbers)
-      do j = size(input%materials), 1, -1
-        if (input%materials(j)%name == input%bodies(k)%material) numbers(k) = j
-      end do
-    end do
-  end function material_of_parts
 
   !> The law of a material.
   pure function new_law(given) result(law)
