@@ -29,7 +29,8 @@ module pd_model
     type(platens_t)   :: platens
     type(supports_t)  :: supports
     type(loads_t)     :: loads
-    real(wp), allocatable :: strength(:)     !! initial strength of the points (n) [Pa]
+    real(wp), allocatable :: strength(:)     !! initial strength of the rows (n) [Pa]
+    real(wp), allocatable :: shown_strength(:)   !! of the points of all stages [Pa]
     real(wp) :: spacing = 0.0_wp             !! dx [m]
     real(wp) :: delta = 0.0_wp               !! horizon [m]
     real(wp) :: damping = 0.0_wp             !! C [kg/(m^3 s)]

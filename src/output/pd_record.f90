@@ -126,8 +126,10 @@ contains
     description%upper = model%body%upper
     description%steps = schedule%steps
     call points_of(model, description%position, description%volume, description%boundary)
-    if (size(model%materials%remembered()) > 0) &
+    if (size(model%materials%remembered()) > 0) then
       description%yield_stress = model%strength(model%shown%row)
+      if (model%whole%n > 0) description%yield_stress = model%shown_strength
+    end if
     allocate (character(64) :: description%boundary_names(size(model%supports%items)))
     do k = 1, size(model%supports%items)
       description%boundary_names(k) = model%supports%items(k)%support%name

@@ -18,7 +18,7 @@ module pd_setup_materials
   use pd_random_field, only: lognormal, new_random_field, standard_normal
   use pd_relaxing, only: new_relaxing, whole_family, whole_family_t
   use pd_small_strain, only: small_strain_t
-  use pd_stages, only: stage_t
+  use pd_stages, only: stage_t, stages_of
   implicit none
   private
 
@@ -65,6 +65,13 @@ contains
       model%materials)
     call set_up_strength(input, material_of, model%body%position, strength)
     model%strength = model%operators%storage%spread(strength)
+    if (model%whole%n > 0) then
+      associate (stages => stages_of(input))
+        allocate (model%shown_strength(model%whole%n))
+        call set_up_strength(input, stages(1)%material_of(model%whole%part), &
+          model%whole%position, model%shown_strength)
+      end associate
+    end if
     if (input%stabilisation%method == 'silling') &
       call set_up_control(input%stabilisation%factor, material_of, model)
   end subroutine set_up_materials

@@ -95,7 +95,7 @@ contains
     type(error_list_t), intent(inout) :: input_errors, errors
     type(error_list_t) :: unheard
     type(body_t) :: bodies(size(stages)), none
-    integer, allocatable :: owner(:, :)
+    integer, allocatable :: owner(:, :), part(:, :)
     real(wp), allocatable :: volume(:, :), position(:, :, :)
     integer :: apart(2, size(stages)), low(2), high(2), k, i
 
@@ -112,6 +112,7 @@ contains
       high = max(high, maxval(bodies(k)%place, dim=1) + apart(:, k))
     end do
     allocate (owner(low(1):high(1), low(2):high(2)), source=-1)
+    allocate (part(low(1):high(1), low(2):high(2)), source=1)
     allocate (volume(low(1):high(1), low(2):high(2)), source=0.0_wp)
     allocate (position(2, low(1):high(1), low(2):high(2)), source=0.0_wp)
     do k = 1, size(stages)
@@ -119,6 +120,7 @@ contains
         associate (x => bodies(k)%place(i, 1) + apart(1, k), &
           y => bodies(k)%place(i, 2) + apart(2, k), boundary => bodies(k)%boundary(i))
           if (owner(x, y) == -1) position(:, x, y) = bodies(k)%position(i, :)
+          if (owner(x, y) == -1) part(x, y) = bodies(k)%part(i)
           if (owner(x, y) >= 0 .and. owner(x, y) /= boundary) then
             call report_change(position(:, x, y), stages(k)%name, errors)
             return
@@ -128,7 +130,7 @@ contains
         end associate
       end do
     end do
-    call list_points(owner, volume, position, low, whole)
+    call list_points(owner, part, volume, position, low, whole)
     whole%lower = bodies(1)%lower
     whole%upper = bodies(1)%upper
   end subroutine set_up_whole
@@ -146,9 +148,10 @@ contains
   end subroutine report_change
 
   !> The points of the occupied places, row by row.
-  pure subroutine list_points(owner, volume, position, low, whole)
+  pure subroutine list_points(owner, part, volume, position, low, whole)
     integer,      intent(in)    :: low(2)
     integer,      intent(in)    :: owner(low(1):, low(2):)        !! -1: none
+    integer,      intent(in)    :: part(low(1):, low(2):)         !! of the first stage with it
     real(wp),     intent(in)    :: volume(low(1):, low(2):)       !! [m^2]
     real(wp),     intent(in)    :: position(:, low(1):, low(2):)  !! [m]
     type(body_t), intent(inout) :: whole
@@ -156,7 +159,7 @@ contains
 
     whole%n = count(owner >= 0)
     allocate (whole%position(whole%n, 2), whole%volume(whole%n), whole%boundary(whole%n), &
-      whole%place(whole%n, 2))
+      whole%part(whole%n), whole%place(whole%n, 2))
     whole%n = 0
     do y = low(2), ubound(owner, 2)
       do x = low(1), ubound(owner, 1)
@@ -165,6 +168,7 @@ contains
         whole%position(whole%n, :) = position(:, x, y)
         whole%volume(whole%n) = volume(x, y)
         whole%boundary(whole%n) = owner(x, y)
+        whole%part(whole%n) = part(x, y)
         whole%place(whole%n, :) = [x, y]
       end do
     end do
