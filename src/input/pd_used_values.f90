@@ -106,6 +106,7 @@ contains
     character(:), allocatable, intent(inout) :: text
 
     if (key%name == 'name' .and. self%about%repeats) then
+      if (text == '') return   ! without a name it keeps its number
       self%label = trim(self%about%name)
       if (text /= key%default) self%label = self%label//'('//text//')'
     else if (text == '') then

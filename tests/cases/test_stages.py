@@ -12,7 +12,7 @@ from test_restart import assert_same, begin, stop
 # Two blocks side by side under a pressure; the right one is dug away.
 BLOCKS = """\
 &run name = 'case', output_dir = 'out' /
-&discretisation spacing = 0.1, horizon = 0.3, layout = 'cells' /
+&discretisation spacing = 0.05, horizon = 0.15, layout = 'cells' /
 &body name = 'left', x_min = 0.0, x_max = 1.0, y_min = 0.0, y_max = 2.0 /
 &body name = 'right', x_min = 1.0, x_max = 2.0, y_min = 0.0, y_max = 2.0 /
 &material name = 'clay', model = 'j2', density = 2000.0, youngs_modulus = 50.0e6
@@ -62,7 +62,7 @@ def run(run_case, tmp_path):
 def test_what_is_dug_away_leaves_the_rest_as_if_it_had_never_been_there(run):
     staged, last, _ = run(BLOCKS)
     there = last["active"] == 1.0
-    assert there.sum() == 10 * 26
+    assert there.sum() == 20 * 46
     assert (last["position"][there, 0] < 1.0).all()
     assert not last["stress"][~there].any()
     # a surface is softer than the inside, but what is dug free had its load before
@@ -71,13 +71,15 @@ def test_what_is_dug_away_leaves_the_rest_as_if_it_had_never_been_there(run):
     assert (last["position"][there] == only["position"]).all()
     inside = (np.abs(only["position"] - [0.5, 1.0]) < [0.3, 0.5]).all(axis=1)
     gap = (last["stress"][there] - only["stress"])[inside]
-    assert np.abs(gap).max() < 3e-2 * np.abs(only["stress"]).max()
+    assert np.abs(gap).max() < 4e-2 * np.abs(only["stress"]).max()
 
 
 def test_the_balance_of_energy_holds_through_the_stages(run):
     rows, _, _ = run(BLOCKS)
     assert rows["time"][-1] == pytest.approx(2.0)
-    assert np.abs(rows["energy_error"]).max() < 3e-3
+    # the first guess of an increment moves the layers alone, and their strain is not small
+    assert np.abs(rows["energy_error"]).max() < 1e-2
+    assert np.abs(rows["energy_error"][-1]) < 1e-4
     assert rows["unbalanced_force"][1:].max() <= 1e-6
 
 
