@@ -124,6 +124,10 @@ contains
     description%horizon = model%delta
     description%lower = model%body%lower
     description%upper = model%body%upper
+    if (model%whole%n > 0) then
+      description%lower = model%whole%lower
+      description%upper = model%whole%upper
+    end if
     description%steps = schedule%steps
     call points_of(model, description%position, description%volume, description%boundary)
     if (size(model%materials%remembered()) > 0) then

@@ -131,8 +131,10 @@ contains
       end do
     end do
     call list_points(owner, part, volume, position, low, whole)
-    whole%lower = bodies(1)%lower
-    whole%upper = bodies(1)%upper
+    do k = 1, 2
+      whole%lower(k) = minval(bodies%lower(k))
+      whole%upper(k) = maxval(bodies%upper(k))
+    end do
   end subroutine set_up_whole
 
   !> A point cannot turn from soil into a boundary, or back.
