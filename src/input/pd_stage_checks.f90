@@ -10,7 +10,8 @@ module pd_stage_checks
   use pd_kinds, only: is_set, wp
   use pd_namelist, only: max_problems
   use pd_namelist_groups, only: namelist_group_t, place_of
-  use pd_stages, only: names_of_bodies, names_of_boundaries, names_of_pressures, stage_names
+  use pd_stages, only: named, names_of_bodies, names_of_boundaries, names_of_pressures, &
+    stage_names, there_at_first
   use pd_text, only: number_text, quoted_list
   implicit none
   private
@@ -32,8 +33,10 @@ contains
       group = group_named(groups, 'stage', k, input%path)
       call check_order(input, k, group, errors)
       associate (stage => input%stages(k))
-        call check_names(stage_names(stage%bodies), names_of_bodies(input), 'bodies', 'body', &
-          group, errors)
+        call check_names(stage_names(stage%excavate), names_of_bodies(input), 'excavate', &
+          'body', group, errors)
+        call check_names(stage_names(stage%fill), names_of_bodies(input), 'fill', 'body', group, &
+          errors)
         call check_names(stage_names(stage%boundaries), names_of_boundaries(input), &
           'boundaries', 'boundary', group, errors)
         call check_names(stage_names(stage%pressures), names_of_pressures(input), 'pressures', &
@@ -41,10 +44,47 @@ contains
         call check_change(input, stage_names(stage%materials), group, errors)
       end associate
     end do
+    call check_presence(input, groups, errors)
     call check_run(input, groups, errors)
     if (size(input%strength_reduction) == 1) &
       call check_reduction(input, group_named(groups, 'strength_reduction', 1, input%path), errors)
   end subroutine check_stages
+
+  !> Whether what is dug away is there, and what is filled in is not.
+  subroutine check_presence(input, groups, errors)
+    type(input_t),          intent(in)    :: input
+    type(namelist_group_t), intent(in)    :: groups(:)
+    type(error_list_t),     intent(inout) :: errors
+    type(namelist_group_t) :: group
+    logical :: there(size(input%bodies))
+    integer :: k
+
+    there = there_at_first(input)
+    do k = 1, size(input%stages)
+      if (errors%count() >= max_problems) return
+      group = group_named(groups, 'stage', k, input%path)
+      call check_bodies(input%stages(k)%excavate, 'excavate', .true., 'is not there')
+      call check_bodies(input%stages(k)%fill, 'fill', .false., 'is there already')
+    end do
+
+  contains
+
+    subroutine check_bodies(text, key, must_be, problem)
+      character(*), intent(in) :: text, key, problem
+      logical,      intent(in) :: must_be
+      integer :: i
+
+      associate (chosen => named(text, names_of_bodies(input)))
+        do i = 1, size(there)
+          if (chosen(i) .and. (there(i) .neqv. must_be)) call errors%add( &
+            'the body '//problem, where=place_of(group, key), &
+            found=''''//input%bodies(i)%name//'''', allowed='each body in its turn')
+        end do
+        where (chosen) there = .not. must_be
+      end associate
+    end subroutine check_bodies
+
+  end subroutine check_presence
 
   !> What a run with stages needs.
   subroutine check_run(input, groups, errors)
@@ -130,8 +170,8 @@ contains
     character(*), intent(in) :: names(:), kind
     character(:), allocatable :: text
 
-    text = '''none''; no '//kind//' has a name'
-    if (any(names /= '')) text = quoted_list(pack(names, names /= ''))//', ''none'''
+    text = 'none: no '//kind//' has a name'
+    if (any(names /= '')) text = quoted_list(pack(names, names /= ''))
   end function allowed_names
 
   !> Pairs of a body and a material.

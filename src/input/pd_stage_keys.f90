@@ -13,7 +13,8 @@ module pd_stage_keys
     character(:), allocatable :: name
     real(wp) :: end_time = unset                       !! [s]
     !> Names that are there, separated by blanks; '': those of the stage before.
-    character(:), allocatable :: bodies, boundaries, pressures
+    character(:), allocatable :: boundaries, pressures
+    character(:), allocatable :: excavate, fill        !! bodies that go, that come; '': none
     character(:), allocatable :: materials             !! 'body=material ...'; '': unchanged
   contains
     procedure :: visit => visit_stage
@@ -33,7 +34,7 @@ contains
     class(stage_input_t), intent(inout) :: self
     class(key_visitor_t), intent(inout) :: visitor
     character(*), parameter :: before = 'those of the stage before; in the first all'
-    character(*), parameter :: words = 'names, separated by blanks, or none'
+    character(*), parameter :: words = 'names, separated by blanks'
 
     call visitor%group(group_key_t('stage', repeats=.true., &
       meaning='stages of construction, one after the other; what changes at the start of a ' &
@@ -43,12 +44,14 @@ contains
     call visitor%real_key(key_t('end_time', unit='s', required=.true., range=positive, &
       also='above that of the stage before; that of the last one is the end of the run', &
       meaning='end of the stage'), self%end_time)
-    call visitor%text_key(key_t('bodies', stands_for=before, also=words, &
-      meaning='bodies that are there: what is no longer named is excavated, what is new is ' &
-      //'filled in without stress'), self%bodies)
-    call visitor%text_key(key_t('boundaries', stands_for=before, also=words, &
+    call visitor%text_key(key_t('excavate', stands_for='none', also=words//'; they are there', &
+      meaning='bodies that are dug away'), self%excavate)
+    call visitor%text_key(key_t('fill', stands_for='none', also=words//'; they are not there', &
+      meaning='bodies that are placed, without stress; a body that any stage fills is not there ' &
+      //'at the beginning, unless it is dug away first'), self%fill)
+    call visitor%text_key(key_t('boundaries', stands_for=before, also=words//', or none', &
       meaning='boundaries that are there; they move from their first stage on'), self%boundaries)
-    call visitor%text_key(key_t('pressures', stands_for=before, also=words, &
+    call visitor%text_key(key_t('pressures', stands_for=before, also=words//', or none', &
       meaning='pressures that act; a ramp_time counts from their first stage on'), self%pressures)
     call visitor%text_key(key_t('materials', stands_for='no change', &
       also='body=material, separated by blanks', &

@@ -8,7 +8,7 @@ module pd_stages
   private
 
   public :: stage_t, stages_of, stage_names, names_of_bodies, names_of_boundaries
-  public :: names_of_pressures
+  public :: names_of_pressures, named, there_at_first
 
   integer, parameter :: name_length = 80
   character(*), parameter :: no_names = 'none'
@@ -43,7 +43,8 @@ contains
       associate (given => input%stages(k), stage => stages(k))
         stage%name = given%name
         stage%end_time = given%end_time
-        call choose(given%bodies, names_of_bodies(input), stage%has_body)
+        where (named(given%excavate, names_of_bodies(input))) stage%has_body = .false.
+        where (named(given%fill, names_of_bodies(input))) stage%has_body = .true.
         call choose(given%boundaries, names_of_boundaries(input), stage%has_boundary)
         call choose(given%pressures, names_of_pressures(input), stage%has_pressure)
         call change_materials(given%materials, input, stage%material_of)
@@ -62,7 +63,7 @@ contains
     integer :: j, k
 
     stage%name = ''
-    allocate (stage%has_body(size(input%bodies)), source=.true.)
+    allocate (stage%has_body(size(input%bodies)), source=there_at_first(input))
     allocate (stage%has_boundary(size(input%boundaries)), source=.true.)
     allocate (stage%has_pressure(size(input%pressures)), source=.true.)
     allocate (stage%boundary_since(size(input%boundaries)), source=0.0_wp)
@@ -75,17 +76,38 @@ contains
     end do
   end function everything
 
-  !> Those of some names that a text holds; where it holds nothing, there is no change.
+  !> Bodies that are there at the beginning: those that nothing fills before it digs them away.
+  pure function there_at_first(input) result(there)
+    type(input_t), intent(in) :: input
+    logical :: there(size(input%bodies))
+    integer :: k
+
+    there = .true.
+    do k = size(input%stages), 1, -1
+      where (named(input%stages(k)%fill, names_of_bodies(input))) there = .false.
+      where (named(input%stages(k)%excavate, names_of_bodies(input))) there = .true.
+    end do
+  end function there_at_first
+
+  !> Which of some names a text holds.
+  pure function named(text, names) result(found)
+    character(*), intent(in) :: text
+    character(*), intent(in) :: names(:)
+    logical :: found(size(names))
+    integer :: k
+
+    associate (words => stage_names(text))
+      found = [(any(words == names(k)) .and. names(k) /= '', k=1, size(names))]
+    end associate
+  end function named
+
+  !> Those that a text names; where it holds nothing, there is no change.
   pure subroutine choose(text, names, chosen)
     character(*), intent(in)    :: text
     character(*), intent(in)    :: names(:)
     logical,      intent(inout) :: chosen(:)
-    integer :: k
 
-    if (text == '') return
-    associate (words => stage_names(text))
-      chosen = [(any(words == names(k)) .and. names(k) /= '', k=1, size(names))]
-    end associate
+    if (text /= '') chosen = named(text, names)
   end subroutine choose
 
   !> Give bodies another material.

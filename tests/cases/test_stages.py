@@ -21,12 +21,13 @@ BLOCKS = """\
   poissons_ratio = 0.3, yield_stress = 2.0e4 /
 &boundary name = 'base', side = 'bottom', contact = 'smooth' /
 &boundary name = 'cap', side = 'top', contact = 'smooth', velocity = 0.0, -0.001 /
-&stage name = 'press', end_time = 1.0, bodies = 'left right' /
-&stage name = 'dig', end_time = 2.0, bodies = 'left' /
+&stage name = 'press', end_time = 1.0 /
+&stage name = 'dig', end_time = 2.0, excavate = 'right' /
 &integration method = 'equilibrium', increments = 5, residual = 1.0e-6 /
 &stabilisation method = 'relaxing' /
 &output frame_count = 4 /
 """
+PRESS, DIG = "end_time = 1.0", "excavate = 'right'"
 BAR = """\
 &run name = 'case', output_dir = 'out' /
 &discretisation spacing = 0.1, horizon = 0.3, layout = 'cells' /
@@ -66,7 +67,7 @@ def test_what_is_dug_away_leaves_the_rest_as_if_it_had_never_been_there(run):
     assert (last["position"][there, 0] < 1.0).all()
     assert not last["stress"][~there].any()
     # a surface is softer than the inside, but what is dug free had its load before
-    direct, only, _ = run(BLOCKS.replace("bodies = 'left right'", "bodies = 'left'"))
+    direct, only, _ = run(BLOCKS.replace(DIG, "").replace(PRESS, f"{PRESS}, {DIG}"))
     assert staged["base_force_y"][-1] == pytest.approx(direct["base_force_y"][-1], rel=3e-2)
     assert (last["position"][there] == only["position"]).all()
     inside = (np.abs(only["position"] - [0.5, 1.0]) < [0.3, 0.5]).all(axis=1)
@@ -84,8 +85,8 @@ def test_the_balance_of_energy_holds_through_the_stages(run):
 
 
 def test_a_boundary_moves_from_its_first_stage_on(run):
-    text = BLOCKS.replace("bodies = 'left right'", "bodies = 'left right', boundaries = 'base'")
-    text = text.replace("bodies = 'left' /", "bodies = 'left', boundaries = 'base cap' /")
+    text = BLOCKS.replace(PRESS, f"{PRESS}, boundaries = 'base'")
+    text = text.replace(DIG, "boundaries = 'base cap', excavate = 'right'")
     rows, last, _ = run(text)
     cap = last["boundary"] == 2
     there = cap & (last["active"] == 1.0)
@@ -96,7 +97,7 @@ def test_a_boundary_moves_from_its_first_stage_on(run):
 
 
 def test_a_stage_can_change_the_material_of_a_body(run):
-    text = BLOCKS.replace("bodies = 'left' /", "materials = 'right=soft' /")
+    text = BLOCKS.replace(DIG, "materials = 'right=soft'")
     _, last, _ = run(text)
     right = (last["position"][:, 0] > 1.0) & (last["boundary"] == 0)
     left = (last["position"][:, 0] < 1.0) & (last["boundary"] == 0)
@@ -106,9 +107,7 @@ def test_a_stage_can_change_the_material_of_a_body(run):
 
 
 def test_new_soil_is_placed_without_stress(run):
-    text = BLOCKS.replace("bodies = 'left right'", "bodies = 'left', boundaries = 'base cap'")
-    text = text.replace("bodies = 'left' /", "bodies = 'left right' /")
-    text = changed(text, velocity="0.0, 0.0")
+    text = changed(BLOCKS.replace(DIG, "fill = 'right'"), velocity="0.0, 0.0")
     rows, last, _ = run(text)
     assert np.abs(last["stress"]).max() < 1e-6
     assert np.abs(rows["energy_error"]).max() < 1e-9
@@ -156,14 +155,17 @@ def test_a_first_factor_that_is_not_borne_is_a_failure(run_case, tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "status", "message"),
     [
-        ("bodies = 'left' /", "bodies = 'middle' /", 2, "there is no body of this name"),
-        ("bodies = 'left' /", "pressures = 'p' /", 2, "there is no pressure of this name"),
-        ("bodies = 'left' /", "boundaries = 'wall' /", 2, "there is no boundary of this name"),
-        ("bodies = 'left' /", "materials = 'left' /", 2, "a body without a material"),
-        ("bodies = 'left' /", "materials = 'left=rock' /", 2, "there is no material of this name"),
+        (DIG, "excavate = 'middle'", 2, "there is no body of this name"),
+        (DIG, "pressures = 'p'", 2, "there is no pressure of this name"),
+        (DIG, "boundaries = 'wall'", 2, "there is no boundary of this name"),
+        (DIG, "materials = 'left'", 2, "a body without a material"),
+        (DIG, "materials = 'left=rock'", 2, "there is no material of this name"),
         ("end_time = 2.0", "end_time = 0.5", 2, "a stage ends before the one before it"),
         ("name = 'dig'", "name = 'press'", 2, "two stages have the same name"),
-        ("bodies = 'left' /", "bodies = 'none' /", 3, "a stage has no body"),
+        (DIG, "excavate = 'left right'", 3, "a stage has no body"),
+        (DIG, "fill = 'left' /\n&stage name = 'again', end_time = 3.0, fill = 'left'", 2,
+         "the body is there already"),
+        (PRESS, f"{PRESS}, {DIG}", 2, "the body is not there"),
         ("method = 'equilibrium', increments = 5, residual = 1.0e-6", "damping = 1.0", 2,
          "stages go from equilibrium to equilibrium"),
         ("increments = 5", "increments = 5, end_time = 3.0", 2,
