@@ -6,10 +6,11 @@
 !> Source: doc/theory.md, section 6.
 module pd_strength_reduction
   use pd_errors, only: error_list_t, exit_file, exit_interrupted, exit_terminated, outcome_t
+  use pd_forces, only: forces
   use pd_kinds, only: wp
   use pd_materials, only: material_t
   use pd_record, only: record_frame, record_line, record_tries, save_checkpoint
-  use pd_relaxation, only: keep_start, relax, relaxed_t
+  use pd_relaxation, only: keep_start, relax, relaxed_t, return_to_start
   use pd_run, only: run_t
   use pd_run_end, only: fail, fastest_row
   use pd_state, only: state_t
@@ -81,7 +82,7 @@ contains
     type(relaxed_t) :: relaxed
     real(wp) :: largest
     character(:), allocatable :: outcome
-    integer :: k
+    integer :: failed_row, k
 
     run%state = start
     run%state%strength = start%strength / factor
@@ -91,8 +92,10 @@ contains
     end do
     associate (relaxation => run%increments%relaxation, model => run%model)
       call keep_start(relaxation, run%state)
-      if (allocated(model%operators%relaxing)) call model%operators%relaxing%follow(1.0_wp)
       call relax(model, run%clock%time(), run%state, relaxation, run%timing, relaxed)
+      call return_to_start(relaxation, run%state)
+      if (allocated(model%operators%relaxing)) call model%operators%relaxing%follow(0.0_wp)
+      call forces(model, run%clock%time(), run%state, relaxation%blocks, run%timing, failed_row)
     end associate
     run%state%velocity = run%state%displacement - start%displacement
     largest = sqrt(maxval(sum(run%state%velocity**2, dim=2)))
