@@ -2,15 +2,16 @@
 module pd_run
   use, intrinsic :: iso_fortran_env, only: compiler_version, int64
   use omp_lib, only: omp_get_max_threads
+  use pd_body_force, only: body_force_t, new_body_force
   use pd_checkpoint, only: checkpoint_t
   use pd_clock, only: clock_t
   use pd_command_line, only: options_t
   use pd_errors, only: error_list_t, exit_file, exit_input, exit_model, outcome_t
   use pd_history_columns, only: history_columns
-  use pd_increment, only: increments_t, new_increments
+  use pd_increment, only: begin_increments, increments_t, new_increments
   use pd_input, only: read_input
   use pd_input_types, only: input_t
-  use pd_kinds, only: wp
+  use pd_kinds, only: is_set, wp
   use pd_ledger, only: ledger_t, new_ledger
   use pd_model, only: model_t, release_set_up, start
   use pd_observe, only: column_t, moment_at, observation_t, observe
@@ -20,21 +21,25 @@ module pd_run
   use pd_run_description, only: provenance_t
   use pd_schedule, only: schedule_t
   use pd_setup, only: set_up_model
-  use pd_setup_body, only: set_up_body
   use pd_setup_schedule, only: set_up_schedule
+  use pd_setup_stages, only: set_up_stage_body, set_up_whole
+  use pd_stages, only: stage_t, stages_of
   use pd_state, only: state_t
   use pd_step, only: step_work_t
   use pd_step_limit, only: new_step_limit, step_limit_t
   use pd_summary, only: summarise, summary_t
+  use pd_tables, only: new_table
   use pd_timing, only: timing_t
   use pd_version, only: build_flags, code_version, git_hash
   implicit none
   private
 
-  public :: run_t, set_up_run, open_outputs
+  public :: run_t, set_up_run, open_outputs, start_increments, add_release
+  public :: keep_standing_load
 
   type :: run_t
     type(input_t)      :: input
+    type(stage_t), allocatable :: stages(:)
     type(model_t)      :: model
     type(schedule_t)   :: schedule
     type(clock_t)      :: clock
@@ -74,20 +79,23 @@ contains
     if (.not. options%check) call look_for_earlier_run(options, run, outcome)
     if (outcome%done) return
 
-    call set_up_body(run%input, run%model%body, run%warnings, input_errors, errors)
+    allocate (run%stages, source=stages_of(run%input))
+    call set_up_bodies(run, input_errors, errors)
     call outcome%end_if_any(input_errors, exit_input)
     call outcome%end_if_any(errors, exit_model)
     if (outcome%done) return
     if (run%checkpoint%history_rows > 0) then
-      if (.not. same_points(run%checkpoint, run%model%body)) &
-        call errors%add('the points are not those of the checkpoint', run%input%path, &
+      if (.not. same_points(run%checkpoint, run%model)) call errors%add( &
+        'the points are not those of the checkpoint', run%input%path, &
         allowed='the same body and file of points, or --force for a new run')
       call outcome%end_if_any(errors, exit_input)
       if (outcome%done) return
     end if
-    call set_up_model(run%input, run%model, errors)
+    call set_up_model(run%input, run%model, errors, run%stages(run%checkpoint%clock%stage))
+    call try_later_stages(run, errors)
     call outcome%end_if_any(errors, exit_model)
     if (outcome%done) return
+    call keep_standing_load(run, run%stages(run%checkpoint%clock%stage), run%model)
     call look_at_model(run)
     if (run%checkpoint%history_rows > 0) then
       if (.not. same_history(run%state, run%model)) &
@@ -104,13 +112,93 @@ contains
     call outcome%end_if_any(errors, exit_input)
     if (outcome%done .or. options%check) return
     if (run%model%at_equilibrium) then
-      associate (given => run%input%integration)
-        call new_increments(run%model, given%increments, given%relaxation, given%residual, &
-          run%schedule, run%clock, run%increments)
-      end associate
+      call start_increments(run)
+      if (run%clock%step == 0) call begin_increments(run%increments, run%schedule, run%clock)
     end if
     call begin_state(run)
   end subroutine set_up_run
+
+  !> The body of the present stage and, where there are several, the points of all of them.
+  subroutine set_up_bodies(run, input_errors, errors)
+    type(run_t),        intent(inout) :: run
+    type(error_list_t), intent(inout) :: input_errors, errors
+
+    call set_up_whole(run%input, run%stages, run%model%whole, input_errors, errors)
+    if (errors%count() + input_errors%count() > 0) return
+    call set_up_stage_body(run%input, run%stages(run%checkpoint%clock%stage), run%model%whole, &
+      run%model%body, run%warnings, input_errors, errors)
+  end subroutine set_up_bodies
+
+  !> Set up the models of all stages before the first one runs.
+  subroutine try_later_stages(run, errors)
+    type(run_t),        intent(in)    :: run
+    type(error_list_t), intent(inout) :: errors
+    type(error_list_t) :: unheard
+    type(model_t) :: model, empty
+    integer :: k
+
+    do k = run%checkpoint%clock%stage + 1, size(run%stages)
+      if (errors%count() > 0) return
+      model = empty
+      model%whole = run%model%whole
+      call set_up_stage_body(run%input, run%stages(k), model%whole, model%body, unheard, errors, &
+        errors)
+      if (errors%count() == 0) call set_up_model(run%input, model, errors, run%stages(k))
+      if (errors%count() > 0) call errors%add('that is in the stage '''//run%stages(k)%name//'''')
+    end do
+  end subroutine try_later_stages
+
+  !> Increments of the present stage.
+  subroutine start_increments(run)
+    type(run_t), intent(inout) :: run
+    real(wp) :: duration
+
+    associate (given => run%input%integration, stage => run%stages(run%clock%stage))
+      duration = min(stage%end_time, run%schedule%end_time) - stage%start_time
+      call new_increments(run%model, duration / real(given%increments, wp), given%relaxation, &
+        given%residual, run%increments)
+    end associate
+  end subroutine start_increments
+
+  !> What the present stage has changed comes in evenly over it: a load that holds the change falls
+  !> to nothing.
+  subroutine add_release(stage, state, model)
+    type(stage_t), intent(in)    :: stage
+    type(state_t), intent(in)    :: state
+    type(model_t), intent(inout) :: model
+    type(body_force_t) :: release
+
+    if (.not. stage%start_time > 0.0_wp) return
+    release = new_body_force('release', -state%released, model%points%volume, 0.0_wp, &
+      [0.0_wp, 0.0_wp], 'what the stage has changed')
+    release%factor = new_table([stage%start_time, stage%end_time], [1.0_wp, 0.0_wp], 0.0_wp)
+    call model%loads%append(release)
+    model%releases = .true.
+  end subroutine add_release
+
+  !> A later stage keeps the load that goes with the initial stress, on the points that are left.
+  subroutine keep_standing_load(run, stage, model)
+    type(run_t),   intent(in)    :: run
+    type(stage_t), intent(in)    :: stage   !! of the model
+    type(model_t), intent(inout) :: model
+    type(error_list_t) :: unheard
+    type(model_t) :: first
+    integer :: k
+
+    if (.not. stage%start_time > 0.0_wp .or. .not. is_set(run%input%initial_stress%k0)) return
+    first%whole = model%whole
+    call set_up_stage_body(run%input, run%stages(1), first%whole, first%body, unheard, unheard, &
+      unheard)
+    call set_up_model(run%input, first, unheard, run%stages(1))
+    do k = 1, size(first%loads%items)
+      select type (load => first%loads%items(k)%load)
+      class is (body_force_t)
+        if (load%kind /= 'initial stress') cycle
+        call model%loads%append(new_body_force(load%kind, load%density * model%points%free, &
+          model%points%volume, 0.0_wp, [0.0_wp, 0.0_wp], 'of the initial stress'))
+      end select
+    end do
+  end subroutine keep_standing_load
 
   !> Warn of what can be set up and is hardly meant.
   subroutine look_at_model(run)
@@ -188,8 +276,9 @@ contains
     associate (model => run%model, state => run%state, ledger => run%ledger)
       if (run%checkpoint%history_rows > 0) then
         state%remembered = model%materials%remembered()
-        call state%scatter(model%operators%storage%row, model%operators%n)
+        call state%scatter(model%shown%row, model%operators%n)
         state%strength = model%strength
+        call add_release(run%stages(run%clock%stage), state, model)
         call ledger%fit(model%blocks)
         call model%operators%take_in(state%displacement)
         call model%supports%take_reactions(model%points%volume, run%clock%time(), state%force)

@@ -12,8 +12,10 @@ program perigeo
   use pd_increment, only: take_increment
   use pd_run, only: open_outputs, run_t, set_up_run
   use pd_run_end, only: end_without_equilibrium, finish_run
+  use pd_run_stages, only: begin_stage_if_due
   use pd_run_steps, only: due_after_step, due_t, write_what_is_due
   use pd_step, only: take_step
+  use pd_strength_reduction, only: find_factor_of_safety
   use pd_system, only: catch_signals
   implicit none
 
@@ -48,7 +50,9 @@ program perigeo
         run%timing, failed_row)
     end if
     call write_what_is_due(due, failed_row, run, outcome)
+    call begin_stage_if_due(run, outcome)
   end do
+  if (.not. outcome%done) call find_factor_of_safety(run, outcome)
   if (.not. outcome%done) call finish_run(run, outcome)
   call leave(outcome)
 end program perigeo

@@ -10,7 +10,7 @@ module pd_fields
   private
 
   public :: field_visitor_t, state_field_t
-  public :: allocating_t, scattering_t, counting_t
+  public :: allocating_t, scattering_t, clearing_t, counting_t
 
   !> A field of a state: named components, or columns that each have a name, a unit and a sentence
   !> of their own (what a law remembers).
@@ -66,6 +66,14 @@ module pd_fields
     procedure :: one_number => scatter_1
     procedure :: several_numbers => scatter_2
   end type scattering_t
+
+  !> Make some rows those of unloaded points.
+  type, extends(field_visitor_t) :: clearing_t
+    integer, allocatable :: rows(:)
+  contains
+    procedure :: one_number => clear_1
+    procedure :: several_numbers => clear_2
+  end type clearing_t
 
   !> Count the numbers per point, allocated or not.
   type, extends(field_visitor_t) :: counting_t
@@ -144,6 +152,25 @@ contains
     if (about%kept) all_rows(self%rows, :) = values
     call move_alloc(all_rows, values)
   end subroutine scatter_2
+
+  subroutine clear_1(self, about, values)
+    class(clearing_t),     intent(inout) :: self
+    type(state_field_t),   intent(in)    :: about
+    real(wp), allocatable, intent(inout) :: values(:)
+
+    values(self%rows) = about%unloaded(1)
+  end subroutine clear_1
+
+  subroutine clear_2(self, about, values)
+    class(clearing_t),     intent(inout) :: self
+    type(state_field_t),   intent(in)    :: about
+    real(wp), allocatable, intent(inout) :: values(:, :)
+    integer :: k
+
+    do k = 1, about%width()
+      values(self%rows, k) = about%unloaded(k)
+    end do
+  end subroutine clear_2
 
   subroutine count_1(self, about, values)
     class(counting_t),     intent(inout) :: self

@@ -13,6 +13,7 @@ module pd_tables
   type :: table_t
     real(wp), allocatable :: times(:)    !! ascending, at least one [s]
     real(wp), allocatable :: rates(:)    !! as many
+    real(wp) :: since = 0.0_wp           !! time from which the integral counts [s]
   contains
     procedure :: rate
     procedure :: final_rate
@@ -44,11 +45,15 @@ contains
   end function constant_table
 
   !> A factor that rises linearly from 0 to 1 in a time, and is 1 at once where that is 0.
-  pure type(table_t) function new_ramp(duration) result(factor)
-    real(wp), intent(in) :: duration   !! [s]
+  pure type(table_t) function new_ramp(duration, start) result(factor)
+    real(wp), intent(in) :: duration          !! [s]
+    real(wp), intent(in), optional :: start   !! of the ramp; absent: 0 [s]
+    real(wp) :: from
 
+    from = 0.0_wp
+    if (present(start)) from = start
     if (duration > 0.0_wp) then
-      factor = new_table([0.0_wp, duration], [0.0_wp, 1.0_wp], 1.0_wp)
+      factor = new_table([from, from + duration], [0.0_wp, 1.0_wp], 1.0_wp)
     else
       factor = constant_table(1.0_wp)
     end if
@@ -112,8 +117,17 @@ contains
     final_rate = self%rates(size(self%rates))
   end function final_rate
 
-  !> Integral of the rate from 0 to t: exact, the trapezoidal rule piece by piece.
+  !> Integral of the rate from 0, or from the time since which it counts, to t.
   pure real(wp) function integral(self, t)
+    class(table_t), intent(in) :: self
+    real(wp),       intent(in) :: t          !! [s]
+
+    integral = integral_from_zero(self, t)
+    if (self%since > 0.0_wp) integral = integral - integral_from_zero(self, self%since)
+  end function integral
+
+  !> Integral of the rate from 0 to t: exact, the trapezoidal rule piece by piece.
+  pure real(wp) function integral_from_zero(self, t) result(integral)
     class(table_t), intent(in) :: self
     real(wp),       intent(in) :: t          !! [s]
     real(wp) :: a, b, rate_a
@@ -131,7 +145,7 @@ contains
       if (a >= t) return
     end do
     integral = integral + (t - a) * self%rates(size(self%rates))
-  end function integral
+  end function integral_from_zero
 
   !> Rate at b, reached from below within the piece that ends at times(k).
   pure real(wp) function piece_end(table, k, b)

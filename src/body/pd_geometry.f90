@@ -26,6 +26,8 @@ module pd_geometry
                                                 !! that its layer continues (n)
     integer,  allocatable :: place(:, :)        !! column and row on the lattice (n,2); not
                                                 !! allocated: no lattice
+    integer,  allocatable :: box(:, :)          !! lowest and highest column and row of the points
+                                                !! of all stages (2,2); not allocated: no stages
     real(wp) :: lower(2) = 0.0_wp               !! corners of the extent of the body without
     real(wp) :: upper(2) = 0.0_wp               !! fictitious points, as used [m]
     logical,  allocatable :: filled(:, :)       !! square above and right of the lattice line at a

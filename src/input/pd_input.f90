@@ -17,6 +17,7 @@ module pd_input
   use pd_namelist_groups, only: namelist_group_t
   use pd_platen_checks, only: platens_of
   use pd_shape_checks, only: check_shapes
+  use pd_stage_checks, only: check_stages
   use pd_text_file, only: read_text_file
   use pd_used_values, only: compare_used, used_values
   implicit none
@@ -84,6 +85,7 @@ contains
     call check_motion(input, groups, errors)
     call check_loads(input, groups, errors)
     call check_ground(input, groups, errors)
+    call check_stages(input, groups, errors)
   end subroutine read_groups
 
   !> All values of the file, and defaults for the rest.
@@ -99,6 +101,8 @@ contains
     allocate (input%boundaries(count_groups(groups, 'boundary')))
     allocate (input%pressures(count_groups(groups, 'pressure')))
     allocate (input%probes(count_groups(groups, 'probe')))
+    allocate (input%stages(count_groups(groups, 'stage')))
+    allocate (input%strength_reduction(min(1, count_groups(groups, 'strength_reduction'))))
     call reader%open(groups, input%path)
     call input%visit(reader)
     call input%run%complete()
@@ -111,6 +115,9 @@ contains
       input%boundaries(k)%axis = axis_of(input, input%boundaries(k))
     end do
     input%platens = platens_of(input%boundaries)
+    if (size(input%stages) == 0) return
+    input%platens = 0   ! which are there changes
+    input%integration%end_time = input%stages(size(input%stages))%end_time
   end subroutine fill
 
 end module pd_input

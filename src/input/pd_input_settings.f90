@@ -134,7 +134,9 @@ contains
     n = count_groups(groups, parts%group)
     if (parts%which /= '') then
       i = group_of(groups, parts%group, parts%which)
+      ! a new group needs a name that is no number: that of a group that is missing
       if (i == 0 .and. parts%value /= '' .and. is_name(parts%which) .and. &
+        verify(parts%which, '0123456789') > 0 .and. &
         find_key(list%keys, parts%group, 'name') > 0) then
         call append(groups, parts%group, parts%place)
         i = size(groups)

@@ -11,6 +11,7 @@ module pd_input_types
   use pd_material_keys, only: imperfection_input_t, material_input_t, random_field_input_t
   use pd_motion_keys, only: integration_input_t, stabilisation_input_t
   use pd_run_keys, only: output_input_t, run_input_t
+  use pd_stage_keys, only: stage_input_t, strength_reduction_input_t
   implicit none
   private
 
@@ -19,6 +20,7 @@ module pd_input_types
   public :: boundary_input_t, stabilisation_input_t, integration_input_t, imperfection_input_t
   public :: random_field_input_t, output_input_t, pressure_input_t, cut_input_t
   public :: gravity_input_t, initial_stress_input_t, probe_input_t
+  public :: stage_input_t, strength_reduction_input_t
 
   type :: input_t
     character(:), allocatable    :: path               !! of the input file
@@ -32,6 +34,8 @@ module pd_input_types
     type(pressure_input_t), allocatable :: pressures(:)
     type(gravity_input_t)        :: gravity
     type(initial_stress_input_t) :: initial_stress
+    type(stage_input_t),    allocatable :: stages(:)
+    type(strength_reduction_input_t), allocatable :: strength_reduction(:)   !! one or none
     type(stabilisation_input_t)  :: stabilisation
     type(integration_input_t)    :: integration
     type(imperfection_input_t)   :: imperfection
@@ -72,6 +76,12 @@ contains
     end do
     call self%gravity%visit(visitor)
     call self%initial_stress%visit(visitor)
+    do k = 1, size(self%stages)
+      call self%stages(k)%visit(visitor)
+    end do
+    do k = 1, size(self%strength_reduction)
+      call self%strength_reduction(k)%visit(visitor)
+    end do
     call self%stabilisation%visit(visitor)
     call self%integration%visit(visitor)
     call self%imperfection%visit(visitor)
@@ -88,7 +98,8 @@ contains
     type(input_t)    :: one_of_each
 
     allocate (one_of_each%bodies(1), one_of_each%materials(1), one_of_each%boundaries(1), &
-              one_of_each%pressures(1), one_of_each%cuts(1), one_of_each%probes(1))
+              one_of_each%pressures(1), one_of_each%cuts(1), one_of_each%probes(1), &
+              one_of_each%stages(1), one_of_each%strength_reduction(1))
     call one_of_each%visit(list)
   end function all_keys
 

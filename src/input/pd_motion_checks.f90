@@ -218,7 +218,8 @@ contains
         call errors%add('the end of the run is given twice', &
                         where=place_of(group, 'final_strain'), &
                         found='end_time and final_strain', allowed='one of them')
-      else if (.not. (is_given(group, 'end_time') .or. is_given(group, 'final_strain'))) then
+      else if (.not. (is_given(group, 'end_time') .or. is_given(group, 'final_strain')) &
+               .and. size(input%stages) == 0) then
         call errors%add('the end of the run is missing', where=place_of(group), &
                         allowed='end_time [s] or final_strain')
       end if

@@ -39,13 +39,14 @@ contains
 
   !> Platen under a traction over a length in each component; it has no effect in components in
   !> which the points can move apart.
-  pure type(loaded_platen_t) function new_loaded_platen(set, as_one, traction, length, ramp_time) &
-    result(platen)
+  pure type(loaded_platen_t) function new_loaded_platen(set, as_one, traction, length, ramp_time, &
+    start) result(platen)
     type(point_set_t), intent(in) :: set
     logical,           intent(in) :: as_one(2)
     real(wp),          intent(in) :: traction(2)         !! at full load [Pa]
     real(wp),          intent(in) :: length(2)           !! that carries x and y of it [m]
     real(wp),          intent(in) :: ramp_time           !! full load from then on [s]
+    real(wp), optional, intent(in) :: start              !! of the ramp; absent: 0 [s]
 
     platen%name = set%name
     platen%load_kind = 'traction'
@@ -54,7 +55,7 @@ contains
     platen%traction = traction
     platen%full = merge(traction * length, 0.0_wp, as_one)
     platen%ramp_time = ramp_time
-    platen%factor = new_ramp(ramp_time)
+    platen%factor = new_ramp(ramp_time, start)
   end function new_loaded_platen
 
   !> Nothing is prescribed.

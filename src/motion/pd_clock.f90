@@ -14,6 +14,7 @@ module pd_clock
     real(wp) :: time_step = 0.0_wp    !! dt [s]
     integer  :: start_step = 0        !! step since which dt is what it is
     real(wp) :: start_time = 0.0_wp   !! its time [s]
+    integer  :: stage = 1             !! of construction
   contains
     procedure :: time
     procedure :: advance

@@ -24,7 +24,7 @@ module pd_increment
   implicit none
   private
 
-  public :: increments_t, new_increments, take_increment
+  public :: increments_t, new_increments, begin_increments, take_increment
 
   !> A number of an increment that stands out.
   type :: moment_t
@@ -53,22 +53,33 @@ module pd_increment
 
 contains
 
-  !> Increments of a run: so many, of the same length, where none is hard.
-  subroutine new_increments(model, count, rule, residual, schedule, clock, increments)
+  !> Increments of a run, or of a stage of it: up to a length. What stood out before stays known.
+  subroutine new_increments(model, longest, rule, residual, increments)
     type(model_t),      intent(in)    :: model
-    integer,            intent(in)    :: count      !! of the run
+    real(wp),           intent(in)    :: longest    !! where none is hard [s]
     character(*),       intent(in)    :: rule       !! of the relaxation
     real(wp),           intent(in)    :: residual   !! unbalanced force over that from outside
-    type(schedule_t),   intent(inout) :: schedule
-    type(clock_t),      intent(inout) :: clock      !! of the state to go on from
-    type(increments_t), intent(out)   :: increments
+    type(increments_t), intent(inout) :: increments
     real(wp), parameter :: shortest = 1.0_wp / 64.0_wp   ! of the longest
+    integer :: moves
 
-    increments%longest = schedule%end_time / real(count, wp)
-    increments%shortest = shortest * increments%longest
+    increments%longest = longest
+    increments%shortest = shortest * longest
+    moves = increments%relaxation%moves
     call new_relaxation(model, rule, residual, increments%relaxation)
-    if (clock%step == 0) call choose_next(schedule, increments, clock)
+    increments%relaxation%moves = moves
   end subroutine new_increments
+
+  !> Begin with the longest increment.
+  subroutine begin_increments(increments, schedule, clock)
+    type(increments_t), intent(in)    :: increments
+    type(schedule_t),   intent(inout) :: schedule
+    type(clock_t),      intent(inout) :: clock
+
+    if (abs(clock%time_step - increments%longest) > 0.0_wp) &
+      call set_increment(increments%longest, clock, schedule)
+    call choose_next(schedule, increments%longest, clock)
+  end subroutine begin_increments
 
   !> One increment, from the time of the clock to the next; the clock may be set to a shorter one.
   !>
@@ -97,6 +108,7 @@ contains
         call set_increment(0.5_wp * clock%time_step, clock, schedule)
       end do
       increments%under_load = loads_at(model, t + clock%time_step) > loads_at(model, t)
+      if (model%releases) increments%under_load = .true.
       increments%lost = .not. last%at_rest .and. (increments%under_load &
         .or. last%failed_row > 0 .or. last%residual > most_residual)
       if (increments%lost) then
@@ -109,7 +121,7 @@ contains
       call settle(model, t, clock%time_step, relaxation, state, timing)
     end associate
     call enter_work(t, clock, model, state, increments, ledger)
-    call choose_next(schedule, increments, clock)
+    call choose_next(schedule, next_length(increments, clock%time_step), clock)
   end subroutine take_increment
 
   !> First guess of the next equilibrium: the motion goes on.
@@ -201,19 +213,27 @@ contains
     self%number = number
   end subroutine see
 
-  !> Length of the next increment: a part of the time to the next frame, or to the end.
-  subroutine choose_next(schedule, increments, clock)
-    type(schedule_t),   intent(inout) :: schedule
-    type(increments_t), intent(in)    :: increments
-    type(clock_t),      intent(inout) :: clock
+  !> Length of an increment after one of some length, which was hard or easy [s].
+  pure real(wp) function next_length(increments, before) result(wish)
+    type(increments_t), intent(in) :: increments
+    real(wp),           intent(in) :: before   !! [s]
+
+    wish = before
+    if (increments%last%moves > hard) wish = max(increments%shortest, 0.5_wp * wish)
+    if (increments%last%moves < easy) wish = min(increments%longest, 2.0_wp * wish)
+  end function next_length
+
+  !> The next increment is a part of the time to the next frame, or to the end.
+  subroutine choose_next(schedule, longest, clock)
+    type(schedule_t), intent(inout) :: schedule
+    real(wp),         intent(in)    :: longest   !! that the increment may be [s]
+    type(clock_t),    intent(inout) :: clock
     real(wp), parameter :: round_off = 1.0e-6_wp
     real(wp) :: wish, left
     integer  :: k
 
     if (schedule%is_over(clock)) return
-    wish = clock%time_step
-    if (increments%last%moves > hard) wish = max(increments%shortest, 0.5_wp * wish)
-    if (increments%last%moves < easy) wish = min(increments%longest, 2.0_wp * wish)
+    wish = longest
     left = schedule%end_time - clock%time()
     do k = size(schedule%frame_times), 1, -1
       if (schedule%frame_steps(k) > clock%step) left = schedule%frame_times(k) - clock%time()

@@ -9,11 +9,13 @@ module pd_model
   use pd_platens, only: platens_t, reference_ends
   use pd_points, only: points_t, probe_t
   use pd_state, only: state_t
+  use pd_storage, only: storage_t
   use pd_supports, only: supports_t
   implicit none
   private
 
   public :: model_t, damping_frame_t, initial_t, start, damping_frame, release_set_up
+  public :: top_of
 
   !> Strain, stress and internal forces of a body with an initial stress, before any motion.
   type :: initial_t
@@ -26,6 +28,8 @@ module pd_model
   !> the present step.
   type :: model_t
     type(body_t)      :: body
+    type(body_t)      :: whole               !! points of all stages; n = 0: there are no stages
+    type(storage_t)   :: shown               !! rows of the points that results show
     class(operators_t), allocatable :: operators
     type(materials_t) :: materials
     type(blocks_t)    :: blocks              !! of the rows of all fields
@@ -35,10 +39,12 @@ module pd_model
     type(loads_t)     :: loads
     type(initial_t), allocatable :: initial  !! to begin with; not allocated: unloaded
     type(probe_t),   allocatable :: probes(:)
-    real(wp), allocatable :: strength(:)     !! initial strength of the points (n) [Pa]
+    real(wp), allocatable :: strength(:)     !! initial strength of the rows (n) [Pa]
+    real(wp), allocatable :: shown_strength(:)   !! of the points of all stages [Pa]
     real(wp) :: spacing = 0.0_wp             !! dx [m]
     real(wp) :: delta = 0.0_wp               !! horizon [m]
     real(wp) :: damping = 0.0_wp             !! C [kg/(m^3 s)]
+    logical  :: releases = .false.           !! a stage lets in what it has changed
     logical  :: at_equilibrium = .false.     !! time only tells how far loads and supports are
     logical  :: damped_in_frame = .false.    !! damping acts in the frame of the platens
     real(wp) :: highest_frequency = 0.0_wp   !! of the linearised operator [1/s]; 0: not asked for
@@ -63,6 +69,14 @@ contains
     if (allocated(model%initial)) deallocate (model%initial)
   end subroutine release_set_up
 
+  !> Height of the top of the body before any stage has dug into it [m].
+  pure real(wp) function top_of(model) result(top)
+    type(model_t), intent(in) :: model
+
+    top = model%body%upper(2)
+    if (model%whole%n > 0) top = model%whole%upper(2)
+  end function top_of
+
   !> Velocity at both ends of the frame in which the damping acts, at time t.
   pure type(damping_frame_t) function damping_frame(model, t) result(frame)
     type(model_t), intent(in) :: model
@@ -72,17 +86,18 @@ contains
       call reference_ends(model%platens, t, frame%lower, frame%upper)
   end function damping_frame
 
-  !> State at t = 0: undeformed, with the initial stress where there is one, moving with the frame of the damping, supports with their own
-  !> velocity; loads without a ramp act already.
+  !> State at t = 0: undeformed, with the initial stress where there is one, moving with the frame
+  !> of the damping, supports with their own velocity; loads without a ramp act already.
   subroutine start(model, state)
     type(model_t), intent(inout) :: model
     type(state_t), intent(out)   :: state
     type(damping_frame_t) :: frame
     integer :: k
 
-    state%has_initial_strain = allocated(model%initial)
+    state%in_stages = model%whole%n > 0
+    state%has_initial_strain = allocated(model%initial) .or. state%in_stages
     call state%allocate(size(model%points%volume), model%materials%remembered())
-    if (state%has_initial_strain) then
+    if (allocated(model%initial)) then
       state%initial_strain = model%initial%strain
       state%stress = model%initial%stress
       state%force = model%initial%force
@@ -96,7 +111,7 @@ contains
     call model%supports%prescribe(0.0_wp, state%displacement, state%velocity)
     call model%loads%add_forces(model%points%volume, 0.0_wp, state%force)
     call model%supports%share_forces(model%points%volume, 0.0_wp, state%force)
-    if (state%has_initial_strain) &   ! the body leans on them from the start
+    if (allocated(model%initial)) &   ! the body leans on them from the start
       call model%supports%take_reactions(model%points%volume, 0.0_wp, state%force)
     call model%operators%take_in(state%displacement)
   end subroutine start

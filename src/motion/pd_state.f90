@@ -20,8 +20,10 @@ module pd_state
     real(wp), allocatable :: force(:, :)                   !! force density f (n,2) [N/m^3]
     real(wp), allocatable :: displacement_gradient(:, :)   !! H = F - I (n,4) xx xy yx yy
     real(wp), allocatable :: control_memory(:, :)          !! of the relaxing control (n,4) [m]
+    real(wp), allocatable :: released(:, :)                !! change of the forces by the stage (n,2) [N/m^3]
     type(label_t), allocatable :: remembered(:)            !! columns of the history
     logical :: has_initial_strain = .false.                !! it is a field of this state
+    logical :: in_stages = .false.                         !! `released` is needed
   contains
     procedure :: visit
     procedure :: allocate => allocate_state
@@ -74,6 +76,8 @@ contains
     call visitor%field(state_field_t('control_memory', 'm', 'residual that the relaxing '// &
       'control has let go, and that it holds, in the frame of the point', &
       'gone_x gone_y held_x held_y'), self%control_memory)
+    if (self%in_stages) call visitor%field(state_field_t('released', 'N/m^3', 'change of the '// &
+      'forces at the start of the stage', 'x y'), self%released)
     call visitor%field(state_field_t('stress', 'Pa', 'stress conjugate to the strain', tensor), &
       self%stress)
     if (self%has_initial_strain) call visitor%field(state_field_t('initial_strain', '1', &

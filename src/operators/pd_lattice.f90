@@ -65,16 +65,17 @@ module pd_lattice
 contains
 
   !> Offsets, weights and moments.
-  subroutine new_lattice_operators(horizon, spacing, place, volume, operators, sight)
+  subroutine new_lattice_operators(horizon, spacing, place, volume, operators, sight, box)
     type(horizon_t), intent(in) :: horizon
     real(wp),        intent(in) :: spacing       !! dx [m]
     integer,         intent(in) :: place(:, :)   !! column and row of every point (n,2)
     real(wp),        intent(in) :: volume(:)     !! V of every point (n) [m^2]
     type(lattice_operators_t), intent(out) :: operators
     type(sight_t), optional, intent(in) :: sight   !! absent: bonds cross air
+    integer, optional, intent(in) :: box(:, :)   !! of `lattice_storage`
     integer :: reach, i
 
-    operators%storage = lattice_storage(horizon, spacing, place)
+    operators%storage = lattice_storage(horizon, spacing, place, box)
     operators%n = operators%storage%rows
     reach = int(horizon%delta / spacing * (1.0_wp + 1.0e-5_wp)) + 1
     call half_of_offsets(horizon, spacing, operators%storage%stride, reach, operators%shift, &
@@ -88,8 +89,8 @@ contains
     operators%weighs = any(abs(operators%share_of) > 0.0_wp .and. &
       abs(operators%share_of - 1.0_wp) > 1.0e-12_wp)
     if (.not. operators%weighs) operators%share_of = anint(operators%share_of)
-    operators%domain = new_domain(line_start(operators%storage%row(1)), &
-      operators%storage%row(operators%storage%n))
+    operators%domain = new_domain(line_start(operators%storage%ends(1)), &
+      operators%storage%ends(2))
     if (present(sight)) call new_blocked_bonds(sight, operators%storage, operators%shift, &
       operators%xi, operators%weight, operators%blocked)
     if (allocated(operators%blocked)) operators%hidden_bonds = operators%blocked%count

@@ -16,6 +16,7 @@ module pd_storage
     integer :: n = 0                       !! points
     integer :: rows = 0                    !! of every field
     integer :: stride = 0                  !! rows from a line of the lattice to the next; 0: a list
+    integer :: ends(2) = 0                 !! first and last row that may hold a point
     integer, allocatable :: row(:)         !! of every point, ascending (n)
   contains
     procedure, private :: spread_values
@@ -35,21 +36,28 @@ contains
 
     storage%n = n
     storage%rows = n
+    storage%ends = [1, n]
     allocate (storage%row(n))
     storage%row = [(i, i=1, n)]
   end function listed_storage
 
   !> Rows for the box of places around the points of a lattice, line by line, with a margin, so that
   !> a shift by a horizon never leaves the fields.
-  pure type(storage_t) function lattice_storage(horizon, spacing, place) result(storage)
+  pure type(storage_t) function lattice_storage(horizon, spacing, place, box) result(storage)
     type(horizon_t), intent(in) :: horizon
     real(wp),        intent(in) :: spacing       !! dx [m]
     integer,         intent(in) :: place(:, :)   !! column and row of every point (n,2)
+    integer, optional, intent(in) :: box(:, :)   !! lowest and highest column and row of those that
+                                                 !! have room (2,2); absent: of the points
     integer :: low(2), high(2), margin, reach
 
     reach = ceiling(horizon%delta / spacing - 1.0e-6_wp)
     low = minval(place, dim=1)
     high = maxval(place, dim=1)
+    if (present(box)) then
+      low = box(:, 1)
+      high = box(:, 2)
+    end if
     margin = whole_lines(reach)
     storage%n = size(place, 1)
     storage%stride = whole_lines(high(1) - low(1) + 1 + reach)
@@ -57,6 +65,9 @@ contains
     allocate (storage%row(storage%n))
     storage%row = margin + 1 + place(:, 1) - low(1) &
       + storage%stride * (place(:, 2) - low(2) + reach)
+    storage%ends = [storage%row(1), storage%row(storage%n)]
+    if (present(box)) storage%ends = margin + 1 + [storage%stride * reach, &
+      high(1) - low(1) + storage%stride * (high(2) - low(2) + reach)]
   end function lattice_storage
 
   !> First row in the cache line of a row: blocks begin there.

@@ -57,7 +57,7 @@ module pd_checkpoint
   end type reading_t
 
   integer, parameter :: head_length = 512
-  integer, parameter :: schema_version = 3
+  integer, parameter :: schema_version = 4
   character(*), parameter :: schema = 'perigeo checkpoint'
 
 contains
@@ -160,6 +160,7 @@ contains
     call write_attribute(file, '/', 'time_step', checkpoint%clock%time_step, errors)
     call write_attribute(file, '/', 'start_step', checkpoint%clock%start_step, errors)
     call write_attribute(file, '/', 'start_time', checkpoint%clock%start_time, errors)
+    call write_attribute(file, '/', 'stage', checkpoint%clock%stage, errors)
     call write_attribute(file, '/', 'limit_frequency', checkpoint%limit%frequency, errors)
     call write_attribute(file, '/', 'limit_stiffening', checkpoint%limit%stiffening, errors)
     call write_attribute(file, '/', 'limit_step', checkpoint%limit%step, errors)
@@ -290,6 +291,7 @@ contains
     call read_attribute(file, '/', 'time_step', checkpoint%clock%time_step, errors)
     call read_attribute(file, '/', 'start_step', checkpoint%clock%start_step, errors)
     call read_attribute(file, '/', 'start_time', checkpoint%clock%start_time, errors)
+    call read_attribute(file, '/', 'stage', checkpoint%clock%stage, errors)
     call read_attribute(file, '/', 'limit_frequency', checkpoint%limit%frequency, errors)
     call read_attribute(file, '/', 'limit_stiffening', checkpoint%limit%stiffening, errors)
     call read_attribute(file, '/', 'limit_step', checkpoint%limit%step, errors)

@@ -47,8 +47,9 @@ module pd_frame_fields
 contains
 
   !> The fields of the frames of a run.
-  subroutine frame_fields(fields)
+  subroutine frame_fields(fields, in_stages)
     type(frame_field_t), allocatable, intent(out) :: fields(:)
+    logical, optional, intent(in) :: in_stages   !! points come and go
     character(*), parameter :: tensor = 'xx yy zz xy'
 
     fields = [ &
@@ -65,6 +66,9 @@ contains
       'stress|', '', mises_stress), &
       frame_field_t('zero_energy', '1', 'root mean square over the family of the part of the '// &
       'deformation that F does not describe, divided by the horizon', '', zero_energy)]
+    if (.not. present(in_stages)) return
+    if (in_stages) fields = [fields, frame_field_t('active', '1', 'whether the point is there '// &
+      'in this stage: 1, or 0', '', active)]
   end subroutine frame_fields
 
   !> The values of a field at the points of the body and of its layers.
@@ -80,6 +84,17 @@ contains
     view%column = field%column
     call field%values(view, values)
   end subroutine fill_field
+
+  subroutine active(view, values)
+    type(points_view_t), intent(in)  :: view
+    real(wp),            intent(out), contiguous :: values(:, :)
+    integer :: i
+
+    do i = 1, size(values, 2)
+      values(1, i) = merge(1.0_wp, 0.0_wp, &
+        view%model%points%volume(view%model%shown%row(i)) > 0.0_wp)
+    end do
+  end subroutine active
 
   subroutine displacement(view, values)
     type(points_view_t), intent(in)  :: view
@@ -128,7 +143,7 @@ contains
     real(wp),            intent(out), contiguous :: values(:, :)
     integer :: i
 
-    associate (h => view%state%displacement_gradient, row => view%model%operators%storage%row)
+    associate (h => view%state%displacement_gradient, row => view%model%shown%row)
       do i = 1, size(values, 2)
         values(1, i) = determinant(h(row(i), :))
       end do
@@ -147,8 +162,8 @@ contains
       allocate (z2(operators%n))
       call operators%zero_energy_squared(state%displacement, state%displacement_gradient, z2)
       do i = 1, size(values, 2)
-        values(1, i) = sqrt(z2(operators%storage%row(i)) &
-          / operators%weight_sum(operators%storage%row(i))) / view%model%delta
+        values(1, i) = sqrt(z2(view%model%shown%row(i)) &
+          / operators%weight_sum(view%model%shown%row(i))) / view%model%delta
       end do
     end associate
   end subroutine zero_energy
@@ -162,7 +177,7 @@ contains
 
     !$omp parallel do schedule(static) default(none) private(i) shared(model, values, field)
     do i = 1, size(values, 2)
-      values(:, i) = field(model%operators%storage%row(i), :)
+      values(:, i) = field(model%shown%row(i), :)
     end do
     !$omp end parallel do
   end subroutine take
@@ -180,7 +195,7 @@ contains
     do block = 1, view%model%blocks%count
       lo = view%model%blocks%lo(block)
       call of_block(view, block, numbers)
-      associate (storage => view%model%operators%storage)
+      associate (storage => view%model%shown)
         do i = storage%first_point(lo), storage%first_point(view%model%blocks%hi(block) + 1) - 1
           values(:, i) = numbers(storage%row(i) - lo + 1, :size(values, 1))
         end do

@@ -94,7 +94,7 @@ contains
     integer :: i
 
     do i = 1, size(fields)
-      allocate (values(fields(i)%width(), model%body%n))
+      allocate (values(fields(i)%width(), model%shown%n))
       call fill_field(fields(i), model, state, values)
       call overwrite_rows(file, place_of(group, fields(i)), values, errors)
       deallocate (values)

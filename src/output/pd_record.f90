@@ -19,17 +19,18 @@ module pd_record
   use pd_observe, only: column_t, moment_at, moment_t, observation_t, observe
   use pd_progress, only: close_progress, open_progress, progress_t, say, show_progress, status_t
   use pd_result, only: add_row, create_result, finish_result, places_t, result_exists, result_t, &
-    resume_result, write_failed_frame, write_frame, write_rows
+    resume_result, write_failed_frame, write_frame, write_rows, write_tries
   use pd_run_description, only: provenance_t, run_description_t
   use pd_schedule, only: schedule_t
   use pd_state, only: state_t
   use pd_step_limit, only: step_limit_t
+  use pd_tries, only: tries_t
   implicit none
   private
 
   public :: record_t, results_in_the_way, open_record, close_record, record_row, record_frame
   public :: record_failure, record_progress, record_line, observe_state
-  public :: save_checkpoint, load_checkpoint, same_points, same_history
+  public :: record_tries, save_checkpoint, load_checkpoint, same_points, same_history
 
   !> The open outputs of a run.
   type :: record_t
@@ -71,7 +72,9 @@ contains
     type(error_list_t), intent(inout) :: errors
     type(run_description_t) :: description
     logical :: restart
+    integer :: of_safety   ! frames of the search for the factor of safety
 
+    of_safety = 2 * size(input%strength_reduction)
     record%stem = input%run%output_dir//'/'//input%run%name
     record%values = used_values(input)
     restart = checkpoint%history_rows > 0
@@ -84,7 +87,7 @@ contains
     if (restart) then
       call resume_result(record%result, record%stem, description, &
         places_t(checkpoint%frames_written, checkpoint%history_rows), &
-        places_t(schedule%frames_left(checkpoint%clock%step), &
+        places_t(schedule%frames_left(checkpoint%clock%step) + of_safety, &
         schedule%rows_left(checkpoint%clock%step)), checkpoint%clock%step, errors)
       if (errors%count() == 0) call resume_history(record%history, record%stem, record%columns, &
         checkpoint%history_rows, errors)
@@ -92,7 +95,7 @@ contains
     else
       ! the old checkpoints go last: until the new result is there a full disk must cost nothing
       call create_result(record%result, record%stem, description, &
-        places_t(schedule%frames_left(0) + 1, schedule%rows_left(0) + 1), errors)
+        places_t(schedule%frames_left(0) + 1 + of_safety, schedule%rows_left(0) + 1), errors)
       if (errors%count() == 0) call remove_checkpoints(record%stem, errors)
       if (errors%count() == 0) &
         call create_history(record%history, record%stem, record%columns, errors)
@@ -121,21 +124,44 @@ contains
     description%horizon = model%delta
     description%lower = model%body%lower
     description%upper = model%body%upper
+    if (model%whole%n > 0) then
+      description%lower = model%whole%lower
+      description%upper = model%whole%upper
+    end if
     description%steps = schedule%steps
-    description%position = model%points%position(model%operators%storage%row, :)
-    description%volume = model%points%volume(model%operators%storage%row)
-    description%boundary = model%body%boundary
-    if (size(model%materials%remembered()) > 0) &
-      description%yield_stress = model%strength(model%operators%storage%row)
+    call points_of(model, description%position, description%volume, description%boundary)
+    if (size(model%materials%remembered()) > 0) then
+      description%yield_stress = model%strength(model%shown%row)
+      if (model%whole%n > 0) description%yield_stress = model%shown_strength
+    end if
     if (allocated(model%materials%stiffness)) description%youngs_modulus = &
-      model%materials%youngs_modulus_of(model%operators%storage%row)
+      model%materials%youngs_modulus_of(model%shown%row)
     allocate (character(64) :: description%boundary_names(size(model%supports%items)))
     do k = 1, size(model%supports%items)
       description%boundary_names(k) = model%supports%items(k)%support%name
     end do
-    call frame_fields(description%fields)
+    call frame_fields(description%fields, model%whole%n > 0)
     call history_columns(model, description%columns)
   end subroutine describe_run
+
+  !> The points that results show: those of all stages, with the volumes that they have when they
+  !> are there.
+  pure subroutine points_of(model, position, volume, boundary)
+    type(model_t),         intent(in)  :: model
+    real(wp), allocatable, intent(out) :: position(:, :)   !! (n,2) [m]
+    real(wp), allocatable, intent(out) :: volume(:)        !! (n) [m^2]
+    integer,  allocatable, intent(out) :: boundary(:)      !! (n)
+
+    if (model%whole%n > 0) then
+      position = model%whole%position
+      volume = model%whole%volume
+      boundary = model%whole%boundary
+    else
+      position = model%points%position(model%shown%row, :)
+      volume = model%points%volume(model%shown%row)
+      boundary = model%body%boundary
+    end if
+  end subroutine points_of
 
   !> Close all outputs of a run that has come to its end.
   subroutine close_record(record, errors)
@@ -178,6 +204,15 @@ contains
     call write_frame(record%result, record%frames, record%moment, model, state, errors)
     record%frames = record%frames + 1
   end subroutine record_frame
+
+  !> Write the tries of a search for the factor of safety.
+  subroutine record_tries(tries, record, errors)
+    type(tries_t),      intent(in)    :: tries
+    type(record_t),     intent(inout) :: record
+    type(error_list_t), intent(inout) :: errors
+
+    call write_tries(record%result, tries, errors)
+  end subroutine record_tries
 
   !> Write the state of a run that has failed, marked as not valid.
   subroutine record_failure(model, state, clock, record, errors)
@@ -254,10 +289,8 @@ contains
     checkpoint%ledger_blocks(:, 3) = ledger%frame_work
     checkpoint%ledger_blocks(:, 4) = ledger%control
     checkpoint%input = record%values
-    checkpoint%position = model%points%position(model%operators%storage%row, :)
-    checkpoint%volume = model%points%volume(model%operators%storage%row)
-    checkpoint%boundary = model%body%boundary
-    call write_checkpoint(record%stem, checkpoint, state, model%operators%storage%row, errors)
+    call points_of(model, checkpoint%position, checkpoint%volume, checkpoint%boundary)
+    call write_checkpoint(record%stem, checkpoint, state, model%shown%row, errors)
   end subroutine save_checkpoint
 
   !> Read the newest checkpoint and compare its input with the present one. The state has one row
@@ -272,7 +305,8 @@ contains
     character(:), allocatable, intent(out) :: warning
     type(error_list_t), intent(inout) :: file_errors, input_errors
 
-    state%has_initial_strain = is_set(input%initial_stress%k0)
+    state%in_stages = size(input%stages) > 0
+    state%has_initial_strain = is_set(input%initial_stress%k0) .or. state%in_stages
     call read_checkpoint(input%run%output_dir//'/'//input%run%name, checkpoint, state, warning, &
       file_errors)
     if (file_errors%count() > 0) return
@@ -294,14 +328,27 @@ contains
 
   !> Whether the points of a checkpoint are those of the body, boundaries included (a point cloud
   !> may have changed).
-  pure logical function same_points(checkpoint, body) result(same)
+  pure logical function same_points(checkpoint, model) result(same)
     type(checkpoint_t), intent(in) :: checkpoint
-    type(body_t),       intent(in) :: body
+    type(model_t),      intent(in) :: model   !! with its body
 
-    same = size(checkpoint%volume) == body%n
-    if (same) same = all(abs(checkpoint%position - body%position) <= 0.0_wp) &
-      .and. all(abs(checkpoint%volume - body%volume) <= 0.0_wp) &
-      .and. all(checkpoint%boundary == body%boundary)
+    if (model%whole%n > 0) then
+      same = are_those_of(model%whole)
+    else
+      same = are_those_of(model%body)
+    end if
+
+  contains
+
+    pure logical function are_those_of(body)
+      type(body_t), intent(in) :: body
+
+      are_those_of = size(checkpoint%volume) == body%n
+      if (are_those_of) are_those_of = all(abs(checkpoint%position - body%position) <= 0.0_wp) &
+        .and. all(abs(checkpoint%volume - body%volume) <= 0.0_wp) &
+        .and. all(checkpoint%boundary == body%boundary)
+    end function are_those_of
+
   end function same_points
 
   !> Whether the points of a state from a checkpoint remember as much as the laws of the model.

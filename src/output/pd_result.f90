@@ -10,10 +10,11 @@ module pd_result
   use pd_errors, only: error_list_t
   use pd_files, only: file_exists, replace_file
   use pd_frame_fields, only: frame_field_t
-  use pd_frames, only: copy_frame, frame_name, mark_frame, put_frame, reserve_frame
+  use pd_frames, only: copy_frame, frame_name, mark_frame, put_frame, reserve_frame, write_label
   use pd_hdf5, only: close_file, create_file, create_group, flush_file, hdf5_file_t, open_file, &
-    read_attribute, write_attribute
+    read_attribute, write_attribute, write_dataset
   use pd_kinds, only: wp
+  use pd_labels, only: label_t
   use pd_model, only: model_t
   use pd_observe, only: column_t, moment_t
   use pd_rows, only: check_rows, copy_rows, put_rows, reserve_rows, resize_rows
@@ -21,13 +22,14 @@ module pd_result
   use pd_state, only: state_t
   use pd_system, only: remove_file
   use pd_timing, only: now
+  use pd_tries, only: tries_t
   use pd_xdmf, only: write_xdmf, xdmf_grid
   implicit none
   private
 
   public :: places_t, result_t, bunch
   public :: create_result, resume_result, add_row, write_rows, write_frame, write_failed_frame
-  public :: finish_result, result_exists
+  public :: write_tries, finish_result, result_exists
 
   !> Numbers of frames and rows for which a result file has space.
   type :: places_t
@@ -228,6 +230,39 @@ contains
     call mark_frame(file, '/failed_frame', with_strain(result, moment), .false., errors)
     call close_file(file, errors)
   end subroutine write_failed_frame
+
+  !> Write the tries of a search for the factor of safety; it lies between the two attributes.
+  subroutine write_tries(result, tries, errors)
+    type(result_t),     intent(inout) :: result
+    type(tries_t),      intent(in)    :: tries
+    type(error_list_t), intent(inout) :: errors
+    character(*), parameter :: group = '/strength_reduction'
+    type(hdf5_file_t) :: file
+
+    call open_file(file, result%path, .true., errors)
+    call create_group(file, group, errors)
+    call write_attribute(file, group, 'borne', tries%least(), errors)
+    call write_attribute(file, group, 'not_borne', tries%most(), errors)
+    call write_try('factor', '1', 'number by which the strength was divided', tries%factor)
+    call write_try('held', '1', 'whether an equilibrium was found: 1, or 0', &
+      merge(1.0_wp, 0.0_wp, tries%held))
+    call write_try('displacement', 'm', 'largest displacement from the start of the try', &
+      tries%displacement)
+    call write_try('unbalanced_force', '1', 'unbalanced force at the end of the try, over '// &
+      'reactions and loads', tries%unbalanced)
+    call close_file(file, errors)
+
+  contains
+
+    subroutine write_try(name, unit, description, values)
+      character(*), intent(in) :: name, unit, description
+      real(wp),     intent(in) :: values(:)
+
+      call write_dataset(file, group//'/'//name, values, errors)
+      call write_label(file, group//'/'//name, label_t(name, unit, description), errors)
+    end subroutine write_try
+
+  end subroutine write_tries
 
   !> Write the rows that wait, and mark the result as complete: the run has come to its end. Only
   !> now are the number of steps and of rows known for sure, for the time step may have changed.

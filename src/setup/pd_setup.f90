@@ -18,6 +18,8 @@ module pd_setup
   use pd_setup_sight, only: look_around
   use pd_shape_tensor, only: invert_shape_tensors
   use pd_sight, only: sight_t
+  use pd_stages, only: stage_t, stages_of
+  use pd_storage, only: lattice_storage
   implicit none
   private
 
@@ -28,16 +30,22 @@ contains
   !> Operators, materials, supports, loads, damping.
   !>
   !> Errors: a cut that crosses no bond, points that coincide, families that are too small, no free
-  !> point, a pressure that acts on no point, a platen under a traction with points of different density, a relaxing control of
-  !> families whose bonds are all equally long, a gradient that leaves nothing of a material, a
-  !> probe far from the body, an initial stress beyond the yield stress.
-  subroutine set_up_model(input, model, errors)
+  !> point, a pressure that acts on no point, a platen under a traction with points of different
+  !> density, a relaxing control of families whose bonds are all equally long, a gradient that leaves
+  !> nothing of a material, a probe far from the body, an initial stress beyond the yield stress.
+  subroutine set_up_model(input, model, errors, stage)
     type(input_t),      intent(in)    :: input
     type(model_t),      intent(inout) :: model    !! in: with its body
     type(error_list_t), intent(inout) :: errors
+    type(stage_t), optional, intent(in) :: stage  !! absent: the first
+    type(stage_t) :: present_stage
     type(horizon_t) :: horizon
     type(sight_t), allocatable :: sight
 
+    associate (stages => stages_of(input))
+      present_stage = stages(1)
+    end associate
+    if (present(stage)) present_stage = stage
     model%at_equilibrium = input%integration%method == 'equilibrium'
     model%spacing = input%discretisation%spacing
     model%delta = input%discretisation%horizon
@@ -47,22 +55,25 @@ contains
     call choose_operators(horizon, input%run%operators, sight, model, errors)
     if (errors%count() > 0) return
     model%blocks = model%operators%domain%blocks
+    model%shown = model%operators%storage
+    if (model%whole%n > 0) model%shown = lattice_storage(horizon, model%spacing, model%whole%place)
     call set_up_points(model)
     call invert_shape_tensors(model%operators, model%points%position, model%points%volume, errors)
     if (errors%count() > 0) return
     if (.not. allocated(model%body%place)) call balance_cloud(input, model)
-    call set_up_materials(input, model)
+    call set_up_materials(input, present_stage, model)
     call check_gradients(input, model, errors)
     if (input%stabilisation%method == 'relaxing') &
       call set_up_relaxing_control(input%stabilisation, horizon, model, errors)
-    call set_up_supports(input, model, errors)
+    call set_up_supports(input, present_stage, model, errors)
     call set_up_platens(input, model)
-    call set_up_loads(input, model, errors)
+    call set_up_loads(input, present_stage, model, errors)
     call set_up_gravity(input, model)
     call set_up_damping(input, model)
     call set_up_probes(input, model, errors)
     if (.not. any(model%points%free > 0.0_wp)) call errors%add('no point is free to move')
-    if (errors%count() == 0) call set_up_initial_stress(input, horizon, model, errors)
+    if (errors%count() == 0 .and. .not. present_stage%start_time > 0.0_wp) &
+      call set_up_initial_stress(input, horizon, model, errors)
   end subroutine set_up_model
 
   !> Lattice operators for a body on a lattice, unless a list is asked for; otherwise the bond list.
@@ -78,7 +89,7 @@ contains
     if (allocated(model%body%place) .and. form /= 'list') then
       allocate (lattice)
       call new_lattice_operators(horizon, model%spacing, model%body%place, model%body%volume, &
-        lattice, sight)
+        lattice, sight, model%body%box)
       call move_alloc(lattice, model%operators)
     else
       allocate (list)

@@ -7,7 +7,7 @@ module pd_setup_gradients
   use pd_errors, only: error_list_t
   use pd_input_types, only: input_t, material_input_t
   use pd_kinds, only: is_set, wp
-  use pd_model, only: model_t
+  use pd_model, only: model_t, top_of
   use pd_text, only: number_text
   implicit none
   private
@@ -49,7 +49,7 @@ contains
       associate (given => input%materials(material_of(i)))
         model%materials%stiffness(model%operators%storage%row(i)) = 1.0_wp &
           + given%youngs_modulus_gradient / given%youngs_modulus &
-          * depth(given, model%body%position(i, 2), model%body%upper(2))
+          * depth(given, model%body%position(i, 2), top_of(model))
       end associate
     end do
   end subroutine set_up_stiffness

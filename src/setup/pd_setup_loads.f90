@@ -18,8 +18,9 @@ module pd_setup_loads
   use pd_rigid_support, only: new_rigid_support
   use pd_sides, only: normal_axis, side_number
   use pd_sliding_support, only: new_sliding_support
+  use pd_stages, only: stage_t
   use pd_supports, only: support_t
-  use pd_tables, only: new_table
+  use pd_tables, only: new_ramp, new_table, table_t
   use pd_text, only: number_text
   implicit none
   private
@@ -31,8 +32,9 @@ contains
   !> Supports, and the components that they leave free.
   !>
   !> Errors: a platen under a traction with points of different density.
-  subroutine set_up_supports(input, model, errors)
+  subroutine set_up_supports(input, stage, model, errors)
     type(input_t),      intent(in)    :: input
+    type(stage_t),      intent(in)    :: stage
     type(model_t),      intent(inout) :: model
     type(error_list_t), intent(inout) :: errors
     real(wp), allocatable :: density(:), mass(:)
@@ -44,7 +46,8 @@ contains
     if (model%at_equilibrium) mass = 0.0_wp   ! nothing has kinetic energy
     allocate (model%supports%items(size(input%boundaries)))
     do k = 1, size(input%boundaries)
-      call new_support(input%boundaries, k, mass, model, model%supports%items(k)%support)
+      call new_support(input%boundaries, k, stage%boundary_since(k), mass, model, &
+        model%supports%items(k)%support)
       if (size(input%boundaries(k)%traction) > 0) call check_density(input%boundaries(k)%name, &
         density(model%supports%items(k)%support%points), errors)
     end do
@@ -64,25 +67,32 @@ contains
   end subroutine check_density
 
   !> Support number k, of the kind that its boundary describes.
-  subroutine new_support(given, k, mass, model, support)
+  !> Without points where it is not there in this stage.
+  subroutine new_support(given, k, since, mass, model, support)
     type(boundary_input_t), intent(in) :: given(:)
     integer,       intent(in) :: k
+    real(wp),      intent(in) :: since            !! time from which it moves [s]
     real(wp),      intent(in) :: mass(:)          !! rho V (n) [kg/m]
     type(model_t), intent(in) :: model
     class(support_t), allocatable, intent(out) :: support
     type(point_set_t) :: set
     integer, allocatable :: columns(:, :)
     integer :: c
+    type(table_t) :: motion(3)
 
     associate (b => given(k), body => model%body)
       set = boundary_set(b%name, body%boundary, k)
       set%points = model%operators%storage%row(set%points)
+      motion = [new_table(b%times, b%velocities_x, b%velocity(1)), &
+        new_table(b%times, b%velocities_y, b%velocity(2)), new_table(b%times, b%factors, 1.0_wp)]
+      motion%since = since
       if (b%contact == 'affine') then
-        allocate (support, source=new_affine_support(set, b%velocity_gradient, &
-          new_table(b%times, b%factors, 1.0_wp), model%points%position, mass))
-      else if (size(b%traction) > 0) then
+        allocate (support, source=new_affine_support(set, b%velocity_gradient, motion(3), &
+          model%points%position, mass))
+      else if (size(b%traction) > 0 .and. size(set%points) > 0) then
         allocate (support, source=new_loaded_platen(set, taken(b), b%traction, &
-          loaded_lengths(given, body%sides(side_number(b%side)), body%boundary), b%ramp_time))
+          loaded_lengths(given, body%sides(side_number(b%side)), body%boundary), b%ramp_time, &
+          since))
       else if (b%contact == 'smooth' .and. (size(b%span) > 0 .or. b%edge > 0)) then
         columns = columns_of(body%boundary, body%place, k, b%axis, &
           ceiling(model%delta / model%spacing - 1.0e-6_wp))
@@ -90,13 +100,9 @@ contains
           where (columns(:, c) > 0) &
             columns(:, c) = model%operators%storage%row(max(1, columns(:, c)))
         end do
-        allocate (support, source=new_sliding_support(set, b%axis, &
-          [new_table(b%times, b%velocities_x, b%velocity(1)), &
-           new_table(b%times, b%velocities_y, b%velocity(2))], mass, columns))
+        allocate (support, source=new_sliding_support(set, b%axis, motion(:2), mass, columns))
       else
-        allocate (support, source=new_rigid_support(set, taken(b), &
-          [new_table(b%times, b%velocities_x, b%velocity(1)), &
-           new_table(b%times, b%velocities_y, b%velocity(2))], mass))
+        allocate (support, source=new_rigid_support(set, taken(b), motion(:2), mass))
       end if
     end associate
   end subroutine new_support
@@ -158,24 +164,30 @@ contains
   !> Loads, in the order in which they are added to the forces.
   !>
   !> Errors: a pressure that acts on no point.
-  subroutine set_up_loads(input, model, errors)
+  subroutine set_up_loads(input, stage, model, errors)
     type(input_t),      intent(in)    :: input
+    type(stage_t),      intent(in)    :: stage
     type(model_t),      intent(inout) :: model
     type(error_list_t), intent(inout) :: errors
     type(surface_t) :: surface
-    integer :: k
+    integer :: k, n
 
-    allocate (model%loads%items(size(input%pressures)))
-    if (size(input%pressures) == 0) return
+    allocate (model%loads%items(count(stage%has_pressure)))
+    if (size(model%loads%items) == 0) return
     call find_surface(input%boundaries, model, surface)
+    n = 0
     do k = 1, size(input%pressures)
-      call new_pressure_load(input%pressures(k), surface, model, model%loads%items(k)%load, errors)
+      if (.not. stage%has_pressure(k)) cycle
+      n = n + 1
+      call new_pressure_load(input%pressures(k), stage%pressure_since(k), surface, model, &
+        model%loads%items(n)%load, errors)
     end do
   end subroutine set_up_loads
 
   !> A pressure on a side of the body.
-  subroutine new_pressure_load(given, surface, model, load, errors)
+  subroutine new_pressure_load(given, since, surface, model, load, errors)
     type(pressure_input_t), intent(in)    :: given
+    real(wp),               intent(in)    :: since    !! time at which it sets in [s]
     type(surface_t),        intent(in)    :: surface
     type(model_t),          intent(in)    :: model
     class(load_t), allocatable, intent(out) :: load
@@ -183,6 +195,7 @@ contains
     type(pressure_t) :: pressure
 
     pressure = new_pressure(given%name, given%side, given%value, given%span, given%ramp_time)
+    pressure%factor = new_ramp(given%ramp_time, since)
     call spread_on_side(surface, model%body%sides(side_number(given%side)), pressure)
     pressure%points = model%operators%storage%row(pressure%points)
     if (size(pressure%points) == 0) &

@@ -6,7 +6,6 @@ module pd_setup_materials
   use pd_elastic, only: new_elastic
   use pd_errors, only: error_list_t
   use pd_families, only: horizon_t
-  use pd_geometry, only: body_t
   use pd_green_lagrange, only: green_lagrange_t
   use pd_input_types, only: boundary_input_t, input_t, material_input_t, &
     stabilisation_input_t
@@ -16,12 +15,13 @@ module pd_setup_materials
   use pd_logarithmic, only: logarithmic_t
   use pd_materials, only: divide_into_runs, material_t
   use pd_measure, only: measure_t
-  use pd_model, only: model_t
+  use pd_model, only: model_t, top_of
   use pd_operators, only: control_stiffness
   use pd_random_field, only: lognormal, new_random_field, standard_normal
   use pd_relaxing, only: new_relaxing, whole_family, whole_family_t
   use pd_setup_gradients, only: set_up_stiffness, stiffness_of_points, yield_stress_at
   use pd_small_strain, only: small_strain_t
+  use pd_stages, only: stage_t, stages_of
   implicit none
   private
 
@@ -35,6 +35,7 @@ contains
 
     associate (points => model%points, body => model%body, storage => model%operators%storage)
       points%position = storage%spread(body%position)
+      if (model%whole%n > 0) points%position = model%shown%spread(model%whole%position)
       points%volume = storage%spread(body%volume)
       points%in_body = storage%spread(merge(1.0_wp, 0.0_wp, body%boundary == 0))
       points%free = spread(storage%spread(spread(1.0_wp, 1, body%n)), 2, 2)
@@ -43,8 +44,9 @@ contains
   end subroutine set_up_points
 
   !> Materials, initial strength, zero-energy control.
-  subroutine set_up_materials(input, model)
+  subroutine set_up_materials(input, stage, model)
     type(input_t), intent(in)    :: input
+    type(stage_t), intent(in)    :: stage
     type(model_t), intent(inout) :: model
     integer,  allocatable :: law_of(:), material_of(:)
     real(wp), allocatable :: strength(:)
@@ -61,15 +63,20 @@ contains
       end associate
     end do
     allocate (material_of(model%body%n), strength(model%body%n))
-    associate (parts => material_of_parts(input))
-      material_of = parts(model%body%part)
-    end associate
+    material_of = stage%material_of(model%body%part)
     law_of = material_of
     call set_up_bearings(input, law_of, model)
     call divide_into_runs(model%blocks, model%operators%storage%spread(law_of), model%materials)
     call set_up_stiffness(input, material_of, model)
-    call set_up_strength(input, material_of, model%body, strength)
+    call set_up_strength(input, material_of, model%body%position, top_of(model), strength)
     model%strength = model%operators%storage%spread(strength)
+    if (model%whole%n > 0) then
+      associate (stages => stages_of(input))
+        allocate (model%shown_strength(model%whole%n))
+        call set_up_strength(input, stages(1)%material_of(model%whole%part), &
+          model%whole%position, top_of(model), model%shown_strength)
+      end associate
+    end if
     if (input%stabilisation%method == 'silling') &
       call set_up_control(input%stabilisation%factor, law_of, model)
   end subroutine set_up_materials
@@ -109,18 +116,6 @@ contains
     is_bearing = boundary%contact == 'smooth' .and. (size(boundary%span) > 0 &
       .or. boundary%edge > 0)
   end function is_bearing
-
-  !> Index of the material of every &body.
-  pure function material_of_parts(input) result(numbers)
-    type(input_t), intent(in) :: input
-    integer :: numbers(size(input%bodies)), j, k
-
-    do k = 1, size(numbers)
-      do j = size(input%materials), 1, -1
-        if (input%materials(j)%name == input%bodies(k)%material) numbers(k) = j
-      end do
-    end do
-  end function material_of_parts
 
   !> The law of a material.
   pure function new_law(given) result(law)
@@ -206,21 +201,21 @@ contains
 
   !> sigma_y0 of every point: that of its material or a random field about it, reduced in the weak
   !> patch.
-  subroutine set_up_strength(input, material_of, body, strength)
+  subroutine set_up_strength(input, material_of, position, top, strength)
     type(input_t), intent(in)  :: input
     integer,       intent(in)  :: material_of(:)             !! of every point
-    type(body_t),  intent(in)  :: body
+    real(wp),      intent(in),  contiguous :: position(:, :)    !! X (n,2) [m]
+    real(wp),      intent(in)  :: top                        !! of the body [m]
     real(wp),      intent(out), contiguous :: strength(:)       !! (n) [Pa]
     real(wp) :: mean
     integer  :: i
 
-    associate (field => input%random_field, flaw => input%imperfection, &
-      position => body%position)
+    associate (field => input%random_field, flaw => input%imperfection)
       strength = 0.0_wp
       if (is_set(field%coefficient_of_variation)) call standard_normal( &
         new_random_field(field%correlation_length, field%seed), position, strength)
       do i = 1, size(strength)
-        mean = yield_stress_at(input%materials(material_of(i)), position(i, 2), body%upper(2))
+        mean = yield_stress_at(input%materials(material_of(i)), position(i, 2), top)
         if (is_set(field%coefficient_of_variation)) then
           strength(i) = lognormal(mean, field%coefficient_of_variation, strength(i))
         else

@@ -49,6 +49,7 @@ contains
           k=1, size(frame_times))]
       end if
     end associate
+    call add_ends_of_stages(input, frame_times)
     if (errors%count() > 0) return
     if (any(frame_times > end_time * (1.0_wp + 1.0e-9_wp))) then
       call errors%add('a frame is asked for after the end of the run', '&output')
@@ -72,6 +73,21 @@ contains
     end function strain_time
 
   end subroutine set_up_schedule
+
+  !> A frame at the end of every stage, too.
+  pure subroutine add_ends_of_stages(input, times)
+    type(input_t),         intent(in)    :: input
+    real(wp), allocatable, intent(inout) :: times(:)   !! ascending [s]
+    real(wp), parameter :: same = 1.0e-9_wp
+    integer :: k
+
+    do k = 1, size(input%stages)
+      associate (t => input%stages(k)%end_time)
+        if (any(abs(times - t) <= same * t)) cycle
+        times = [pack(times, times < t), t, pack(times, times > t)]
+      end associate
+    end do
+  end subroutine add_ends_of_stages
 
   !> Time step by the rule of the input, or the longest increment on the way of equilibrium, unless
   !> it is known.

@@ -60,6 +60,10 @@ def _info_text(facts: dict[str, Any]) -> str:
             f"{f['largest_plastic_strain']:12.5g}{note}"
         )
     lines += _history_text(facts["history"])
+    if "factor_of_safety" in facts:
+        borne, not_borne = facts["factor_of_safety"].values()
+        rest = f", {not_borne:.4g} is not" if np.isfinite(not_borne) else ", and none was not"
+        lines.append(f"  safety       a factor of {borne:.4g} is borne{rest}")
     lines += [f"  {key:<14} {value}" for key, value in facts["provenance"].items()]
     return "\n".join(lines)
 

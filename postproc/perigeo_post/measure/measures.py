@@ -240,6 +240,9 @@ def run_facts(run: Run) -> dict[str, Any]:
         "stored_fields": {k: asdict(v) for k, v in run.stored_fields.items()} if good else {},
         "provenance": run.provenance,
     }
+    safety = run.factor_of_safety
+    if safety:
+        facts["factor_of_safety"] = {"borne": safety[0], "not_borne": safety[1]}
     facts["history"] = _history_facts(run)
     return facts
 

@@ -6,6 +6,7 @@ program is never disturbed. What the program has not yet written is not shown.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -198,6 +199,19 @@ class Run:
         for key, _, value in pairs:
             found.setdefault(key.strip(), value.strip())
         return found
+
+    @property
+    def factor_of_safety(self) -> tuple[float, float] | None:
+        """A factor that is borne and one that is not (infinite: all are); None if not sought."""
+
+        def read(file: Any) -> tuple[float, float] | None:
+            if "strength_reduction" not in file:
+                return None
+            about = file["strength_reduction"].attrs
+            borne, not_borne = float(about["borne"]), float(about["not_borne"])
+            return borne, not_borne if not_borne < 1.0e300 else math.inf
+
+        return self._read(read)
 
     def value(self, key: str) -> str | None:
         """A value as used; the first where its group stands several times; None if absent."""

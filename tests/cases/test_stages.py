@@ -1,0 +1,179 @@
+"""Stages of construction and the factor of safety: what stays, what goes, bits, and refusals."""
+
+import re
+import signal
+
+import h5py
+import numpy as np
+import pytest
+from case_files import changed, history
+from test_restart import assert_same, begin, stop
+
+# Two blocks side by side under a pressure; the right one is dug away.
+BLOCKS = """\
+&run name = 'case', output_dir = 'out' /
+&discretisation spacing = 0.05, horizon = 0.15, layout = 'cells' /
+&body name = 'left', x_min = 0.0, x_max = 1.0, y_min = 0.0, y_max = 2.0 /
+&body name = 'right', x_min = 1.0, x_max = 2.0, y_min = 0.0, y_max = 2.0 /
+&material name = 'clay', model = 'j2', density = 2000.0, youngs_modulus = 50.0e6
+  poissons_ratio = 0.3, yield_stress = 1.0e5 /
+&material name = 'soft', model = 'j2', density = 2000.0, youngs_modulus = 50.0e6
+  poissons_ratio = 0.3, yield_stress = 2.0e4 /
+&boundary name = 'base', side = 'bottom', contact = 'smooth' /
+&boundary name = 'cap', side = 'top', contact = 'smooth', velocity = 0.0, -0.001 /
+&stage name = 'press', end_time = 1.0 /
+&stage name = 'dig', end_time = 2.0, excavate = 'right' /
+&integration method = 'equilibrium', increments = 5, residual = 1.0e-6 /
+&stabilisation method = 'relaxing' /
+&output frame_count = 4 /
+"""
+PRESS, DIG = "end_time = 1.0", "excavate = 'right'"
+BAR = """\
+&run name = 'case', output_dir = 'out' /
+&discretisation spacing = 0.1, horizon = 0.3, layout = 'cells' /
+&body name = 'bar', x_min = 0.0, x_max = 1.0, y_min = 0.0, y_max = 2.0 /
+&material model = 'j2', density = 2000.0, youngs_modulus = 50.0e6, poissons_ratio = 0.3
+  yield_stress = 1.0e5, strain_measure = 'small' /
+&boundary name = 'base', side = 'bottom', contact = 'smooth' /
+&boundary name = 'cap', side = 'top', contact = 'smooth', traction = 0.0, -5.0e4, ramp_time = 1.0 /
+&strength_reduction first = 1.0, last = 4.0, tolerance = 0.01 /
+&integration method = 'equilibrium', increments = 5, end_time = 1.0 /
+&stabilisation method = 'relaxing' /
+&output frame_count = 2 /
+"""
+
+
+@pytest.fixture
+def run(run_case, tmp_path):
+    """Return a function that runs a case and returns its history and last frame."""
+
+    def run(text, *options):
+        done = run_case(text, tmp_path, "--force", "--threads", "1", *options)
+        assert done.returncode == 0, done.stderr
+        with h5py.File(tmp_path / "out" / "case.h5", locking=False) as file:
+            frames = [file["frames"][k] for k in sorted(file["frames"])]
+            last = {name: data[()] for name, data in frames[-1].items()}
+            last["position"] = file["points/position"][()]
+            last["boundary"] = file["points/boundary"][()]
+        return history(tmp_path / "out" / "case_history.csv"), last, done.stdout
+
+    return run
+
+
+def test_what_is_dug_away_leaves_the_rest_as_if_it_had_never_been_there(run):
+    staged, last, _ = run(BLOCKS)
+    there = last["active"] == 1.0
+    assert there.sum() == 20 * 46
+    assert (last["position"][there, 0] < 1.0).all()
+    assert not last["stress"][~there].any()
+    # a surface is softer than the inside, but what is dug free had its load before
+    direct, only, _ = run(BLOCKS.replace(DIG, "").replace(PRESS, f"{PRESS}, {DIG}"))
+    assert staged["base_force_y"][-1] == pytest.approx(direct["base_force_y"][-1], rel=3e-2)
+    assert (last["position"][there] == only["position"]).all()
+    inside = (np.abs(only["position"] - [0.5, 1.0]) < [0.3, 0.5]).all(axis=1)
+    gap = (last["stress"][there] - only["stress"])[inside]
+    assert np.abs(gap).max() < 4e-2 * np.abs(only["stress"]).max()
+
+
+def test_the_balance_of_energy_holds_through_the_stages(run):
+    rows, _, _ = run(BLOCKS)
+    assert rows["time"][-1] == pytest.approx(2.0)
+    # the first guess of an increment moves the layers alone, and their strain is not small
+    assert np.abs(rows["energy_error"]).max() < 1e-2
+    assert np.abs(rows["energy_error"][-1]) < 2e-4
+    assert rows["unbalanced_force"][1:].max() <= 1e-6
+
+
+def test_a_boundary_moves_from_its_first_stage_on(run):
+    text = BLOCKS.replace(PRESS, f"{PRESS}, boundaries = 'base'")
+    text = text.replace(DIG, "boundaries = 'base cap', excavate = 'right'")
+    rows, last, _ = run(text)
+    cap = last["boundary"] == 2
+    there = cap & (last["active"] == 1.0)
+    assert last["displacement"][there, 1] == pytest.approx(-0.001)
+    half = rows["time"] <= 1.0
+    assert not rows["cap_force_y"][half].any()
+    assert rows["cap_force_y"][-1] == pytest.approx(-50e6 / 0.91 * 0.001 / 2.0, rel=0.1)
+
+
+def test_a_stage_can_change_the_material_of_a_body(run):
+    text = BLOCKS.replace(DIG, "materials = 'right=soft'")
+    _, last, _ = run(text)
+    right = (last["position"][:, 0] > 1.0) & (last["boundary"] == 0)
+    left = (last["position"][:, 0] < 1.0) & (last["boundary"] == 0)
+    assert last["plastic_strain"][right].min() > 0.0
+    assert not last["plastic_strain"][left & (last["position"][:, 0] < 0.6)].any()
+    assert last["von_mises"][right].max() < 2.002e4
+
+
+def test_new_soil_is_placed_without_stress(run):
+    text = changed(BLOCKS.replace(DIG, "fill = 'right'"), velocity="0.0, 0.0")
+    rows, last, _ = run(text)
+    assert np.abs(last["stress"]).max() < 1e-6
+    assert np.abs(rows["energy_error"]).max() < 1e-9
+
+
+@pytest.mark.parametrize("rows", [30, 140])
+def test_a_restart_in_any_stage_gives_the_same_bits(program, run_case, tmp_path, rows):
+    text = changed(BLOCKS, increments="100", residual="1.0e-8")
+    straight = tmp_path / "straight"
+    straight.mkdir()
+    done = run_case(text, straight, "--quiet", "--threads", "1")
+    assert done.returncode == 0, done.stderr
+    process = begin(program, tmp_path, text)
+    assert stop(process, signal.SIGTERM, tmp_path, rows) == 143
+    done = run_case(text, tmp_path, "--restart", "--quiet", "--threads", "1")
+    assert done.returncode == 0, done.stderr
+    assert_same(tmp_path / "out", straight / "out")
+
+
+def test_the_factor_of_safety_of_a_bar_is_that_of_its_strength(run, tmp_path):
+    _, _, log = run(BAR)
+    borne, not_borne = map(float, re.search(r"safety: (\S+) is borne, (\S+) is not", log).groups())
+    exact = 2.0e5 / np.sqrt(3.0) / 5.0e4
+    assert not_borne - borne <= 0.01
+    assert 0.5 * (borne + not_borne) == pytest.approx(exact, rel=8e-3)
+    with h5py.File(tmp_path / "out" / "case.h5", locking=False) as file:
+        group = file["strength_reduction"]
+        assert group.attrs["borne"] == pytest.approx(borne, rel=1e-4)
+        held = group["held"][()] == 1.0
+        assert (group["factor"][()][held] <= group.attrs["borne"]).all()
+        assert (group["factor"][()][~held] >= group.attrs["not_borne"]).all()
+        assert group["displacement"].attrs["unit"] == b"m"
+        frames = sorted(file["frames"])
+        assert len(frames) == 5
+        moved = [np.abs(file["frames"][k]["displacement"][()]).max() for k in frames[-2:]]
+        assert moved[1] > 5.0 * moved[0]
+
+
+def test_a_first_factor_that_is_not_borne_is_a_failure(run_case, tmp_path):
+    done = run_case(changed(BAR, first="3.0"), tmp_path, "--quiet", "--force")
+    assert done.returncode == 4
+    assert "does not bear the first factor" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "status", "message"),
+    [
+        (DIG, "excavate = 'middle'", 2, "there is no body of this name"),
+        (DIG, "pressures = 'p'", 2, "there is no pressure of this name"),
+        (DIG, "boundaries = 'wall'", 2, "there is no boundary of this name"),
+        (DIG, "materials = 'left'", 2, "a body without a material"),
+        (DIG, "materials = 'left=rock'", 2, "there is no material of this name"),
+        ("end_time = 2.0", "end_time = 0.5", 2, "a stage ends before the one before it"),
+        ("name = 'dig'", "name = 'press'", 2, "two stages have the same name"),
+        (DIG, "excavate = 'left right'", 3, "a stage has no body"),
+        (DIG, "fill = 'left' /\n&stage name = 'again', end_time = 3.0, fill = 'left'", 2,
+         "the body is there already"),
+        (PRESS, f"{PRESS}, {DIG}", 2, "the body is not there"),
+        ("method = 'equilibrium', increments = 5, residual = 1.0e-6", "damping = 1.0", 2,
+         "stages go from equilibrium to equilibrium"),
+        ("increments = 5", "increments = 5, end_time = 3.0", 2,
+         "the end of the run is not that of the last stage"),
+    ],
+)
+def test_what_stages_cannot_be_is_refused(run_case, tmp_path, old, new, status, message):
+    assert old in BLOCKS
+    done = run_case(BLOCKS.replace(old, new), tmp_path, "--check")
+    assert done.returncode == status, done.stderr
+    assert message in done.stderr
