@@ -30,9 +30,9 @@ module pd_edge_weights
     real(wp), allocatable :: rest(:, :)        !! r (pairs,2) [m]
     real(wp), allocatable :: length(:)         !! that free points stand for (edges) [m]
     real(wp), allocatable, private :: closeness(:)   !! c > 0 (pairs) [m]
-    real(wp), allocatable, private :: normal(:, :)   !! of the edge; where all edges in reach of a
-                                                     !! point are nearly parallel, there or back along
-                                                     !! that of the closest one (pairs,2)
+    real(wp), allocatable, private :: normal(:, :)   !! of the edge (pairs,2); where all edges in
+                                                     !! reach of a point are nearly parallel, that
+                                                     !! of the closest one, there or back
   end type edge_weights_t
 
   !> The least sine between two edges that counts as two directions.
@@ -204,7 +204,8 @@ contains
   !>
   !> w = c (mu_e + n_e . s_i), s_i = M_i^-1 (-N_i - sum_e c n_e mu_e), with sum_i w = length:
   !>
-  !>   sum_i [c_ie mu_e - c_ie n_e . M_i^-1 sum_f c_if n_f mu_f] = length_e - sum_i c n_e . M_i^-1 (-N_i)
+  !>   sum_i c_ie [mu_e - n_e . M_i^-1 sum_f c_if n_f mu_f]
+  !>     = length_e - sum_i c_ie n_e . M_i^-1 (-N_i)
   pure subroutine find_multipliers(weights, left, inverse, multiplier)
     type(edge_weights_t), intent(in) :: weights
     real(wp), intent(in) :: left(:, :), inverse(:, :)

@@ -14,7 +14,7 @@ module pd_loads
   type, abstract :: load_t
     character(:), allocatable :: name
     character(:), allocatable :: kind              !! in a word
-    character(:), allocatable :: doubt             !! what a user is warned of; not allocated: nothing
+    character(:), allocatable :: doubt             !! what to warn of; not allocated: nothing
   contains
     procedure(add_forces),  deferred :: add_forces
     procedure(work),        deferred :: work

@@ -2,8 +2,8 @@
 !>
 !> Families are cut off at a surface, so a homogeneous stress P is in equilibrium only with forces
 !> P N_i on the points near it. A pressure applies exactly these: N_i is its weight at a point, and
-!> `pd_edge_weights` says which part of it belongs to which edge. Loads on the outermost points alone
-!> would put several times the stress there.
+!> `pd_edge_weights` says which part of it belongs to which edge. Loads on the outermost points
+!> alone would put several times the stress there.
 !> Source: doc/theory.md, section 7.
 module pd_pressure
   use pd_balance, only: left_by_unit_stress
@@ -50,7 +50,7 @@ module pd_pressure
 
   !> Horizons between a pressure and what holds the body, below which the stress is more than 3 %
   !> too small.
-  real(wp), parameter :: least_depth = 1.3_wp
+  real(wp), parameter :: least_depth = 1.5_wp
 
 contains
 
@@ -126,7 +126,7 @@ contains
 
     on_side = .false.
     if (size(side%points) == 0) return
-    if (normal(side%axis) * real(side%outward, wp) < 0.5_wp) return
+    if (normal(side%axis) * real(side%outward, wp) < 1.0_wp - 1.0e-6_wp) return
     ! points stand on the outline or half a spacing below
     on_side = abs(start(side%axis) - surface%position(side%points(1), side%axis)) &
       < 0.75_wp * surface%spacing
@@ -222,10 +222,11 @@ contains
     type(pressure_t), intent(inout) :: pressure
 
     ! half a spacing, with the layout nodes one, is between the body and this point
-    if (depth - 0.5_wp * surface%spacing >= least_depth * surface%delta) return
+    if (depth - 0.5_wp * surface%spacing >= (least_depth - 1.0e-6_wp) * surface%delta) &
+      return
     pressure%doubt = 'the body is less than '//short_number(least_depth)//' horizons thick '// &
-      'between the pressure and the boundary that holds it: the stress under the pressure comes '// &
-      'out up to 10 % too small at one horizon, 18 % at two thirds; a smaller horizon helps'
+      'between the pressure and the boundary that holds it: the stress under the pressure '// &
+      'comes out up to 11 % too small at one horizon, 18 % at two thirds; a smaller horizon helps'
   end subroutine doubt_depth
 
   !> The part of an interval on an edge that is within a span; beyond an end, that of the end.
@@ -244,8 +245,8 @@ contains
     end if
   end function covered
 
-  !> Forces on the points from the share of each pair of edge and point: -p (w n + r). What is missing
-  !> to the whole (where the outline is longer than the body, and round-off) goes by w.
+  !> Forces on the points from the share of each pair of edge and point: -p (w n + r). What is
+  !> missing to the whole (where the outline is longer than the body, and round-off) goes by w.
   pure subroutine apply(surface, share, total, pressure)
     type(surface_t),  intent(in)    :: surface
     real(wp),         intent(in)    :: share(:)   !! 0 to 1 (pairs)
