@@ -26,9 +26,14 @@ contains
     integer :: row
 
     associate (last => run%increments%last, t => run%clock%time())
-      tried = short_number(t + run%clock%time_step)//' s, where the unbalanced force is '// &
-        short_number(last%residual)//' of reactions and loads after '// &
-        integer_text(last%moves)//' moves'
+      tried = short_number(t + run%clock%time_step)//' s, where '
+      if (last%failed_row > 0) then
+        tried = tried//'det F is no longer positive at a point after '
+      else
+        tried = tried//'the unbalanced force is '//short_number(last%residual)// &
+          ' of reactions and loads after '
+      end if
+      tried = tried//integer_text(last%moves)//' moves'
       if (run%clock%step == 0) tried = tried//'; is the body held, and the first load below '// &
         'its limit?'
       if (.not. run%increments%under_load .or. run%clock%step == 0) then

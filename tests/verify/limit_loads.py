@@ -118,7 +118,7 @@ def weight_at_collapse(run: Run) -> float:
     """Unit weight of the last equilibrium, times the height of 1 m, over c."""
     if "limit load:" not in run.path.with_suffix(".log").read_text(encoding="utf-8"):
         raise PostError(f"{run.path}: the run has not come to its limit")
-    gravity = abs(float(run.history()["gravity_y"][-1]))
+    gravity = float(run.history()["gravity"][-1])
     return (run.number("material.density") or 0.0) * gravity / C
 
 
