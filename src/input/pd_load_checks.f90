@@ -4,7 +4,7 @@
 !> because the problem has been reported already.
 module pd_load_checks
   use pd_errors, only: error_list_t
-  use pd_input_checks, only: add_useless, is_cloud
+  use pd_input_checks, only: add_missing, add_useless, is_cloud
   use pd_input_shapes, only: find_extents
   use pd_input_types, only: boundary_input_t, input_t
   use pd_input_values, only: group_named, is_given
@@ -129,6 +129,8 @@ contains
                       found='shape = ''file''', allowed='only on a lattice')
       return
     end if
+    if (.not. (is_given(group, 'side') .or. is_given(group, 'body'))) &
+      call add_missing(group, 'side', 'or body', errors)
     if (input%pressures(k)%side == '') return
     do j = 1, size(input%boundaries)
       associate (b => input%boundaries(j))

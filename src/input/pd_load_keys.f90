@@ -29,6 +29,8 @@ module pd_load_keys
 
   type :: pressure_input_t
     character(:), allocatable :: name, side
+    character(:), allocatable :: body                  !! name of a body; '': on a side
+    integer  :: edge = 0                               !! of this body; 0: all of them
     real(wp), allocatable :: span(:)                   !! from, to [m]; size 0: the whole side
     real(wp) :: value = unset                          !! [Pa]
     real(wp) :: ramp_time = 0.0_wp                     !! [s]
@@ -100,15 +102,25 @@ contains
     character(*), parameter :: ramp = 'time in which it rises linearly from 0; 0: whole at once'
 
     call visitor%group(group_key_t('pressure', repeats=.true., &
-      meaning='a load on a side without boundary'))
+      meaning='a load on a side without boundary, or on edges of a body'))
     call visitor%text_key(key_t('name', required=.true., is_name=.true., also='each name once', &
       meaning='name in the log and in the values of the results'), self%name)
-    call visitor%text_key(key_t('side', required=.true., choices='bottom top left right', &
-      also='a side without a boundary; not for a cloud', &
+    call visitor%text_key(key_t('side', stands_for='none', choices='bottom top left right', &
+      also='this or body; a side without a boundary; not for a cloud', &
       meaning='side of the body that the pressure acts on'), self%side)
-    call visitor%list_key(key_t('span', count=2, unit='m', stands_for='the whole side', &
-      also='increasing, within the side', &
-      meaning='part of the side: from, to, in the coordinate along it'), self%span)
+    call visitor%text_key(key_t('body', is_name=.true., stands_for='none', &
+      also='name of a body; in place of side', &
+      meaning='body on whose edges the pressure acts, where they are surface; of a hole the rim'), &
+      self%body)
+    call visitor%integer_key(key_t('edge', unit='1', range=range_t(lower=1.0_wp), &
+      stands_for='all edges of the body', needs_effect=.true., &
+      also='only with body; not for a circle', &
+      meaning='number of the edge: that of the vertex it begins at; of a rectangle 1: bottom, ' &
+      //'2: right, 3: top, 4: left'), self%edge)
+    call visitor%list_key(key_t('span', count=2, unit='m', stands_for='the whole side or edge', &
+      also='increasing, within the side; with body only on one edge', &
+      meaning='part of the side: from, to, in the coordinate along it; of an edge: from its ' &
+      //'first vertex'), self%span)
     call visitor%real_key(key_t('value', unit='Pa', required=.true., &
       meaning='the pressure; positive: it pushes on the body'), self%value)
     call visitor%real_key(key_t('ramp_time', unit='s', default='0.0', range=not_negative, &

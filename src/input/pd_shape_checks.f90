@@ -45,6 +45,10 @@ contains
       if (errors%count() >= max_problems) return
       call check_edges(input, k, group_named(groups, 'boundary', k, input%path), errors)
     end do
+    do k = 1, size(input%pressures)
+      if (errors%count() >= max_problems) return
+      call check_pressed_edges(input, k, group_named(groups, 'pressure', k, input%path), errors)
+    end do
   end subroutine check_shapes
 
   subroutine check_name(bodies, k, group, errors)
@@ -234,20 +238,11 @@ contains
     type(namelist_group_t), intent(in)    :: group
     type(error_list_t),     intent(inout) :: errors
     character(*), parameter :: smooth = 'an edge along an axis, or contact = ''rough'', ''affine'''
-    integer :: n
+    integer :: before
 
-    n = size(outline(input%bodies(number), input%discretisation%spacing), 2)
-    if (n == 0) return   ! that has been reported
-    if (input%bodies(number)%shape == 'circle') then
-      if (is_given(group, 'edge')) call errors%add('a circle has no edges', &
-        where=place_of(group, 'edge'), found=integer_text(b%edge), &
-        allowed='body alone: all round')
-    else if (b%edge > n) then
-      call errors%add('the body '''//b%body//''' has no such edge', &
-        where=place_of(group, 'edge'), found=integer_text(b%edge), allowed='1 to '//integer_text(n))
-      return
-    end if
-    if (b%contact /= 'smooth' .or. is_damaged(group, 'edge')) return
+    before = errors%count()
+    call check_number(input, number, b%edge, group, errors)
+    if (errors%count() > before .or. b%contact /= 'smooth' .or. is_damaged(group, 'edge')) return
     if (.not. is_given(group, 'edge')) then
       call errors%add('a smooth boundary all round a body', where=place_of(group, 'contact'), &
                       found='no edge', allowed=smooth)
@@ -256,6 +251,57 @@ contains
         found='edge '//integer_text(b%edge)//' of '''//b%body//'''', allowed=smooth)
     end if
   end subroutine check_edge
+
+  !> Whether a body has an edge of this number; 0: none is given.
+  subroutine check_number(input, number, edge, group, errors)
+    type(input_t),          intent(in)    :: input
+    integer,                intent(in)    :: number   !! of the body
+    integer,                intent(in)    :: edge
+    type(namelist_group_t), intent(in)    :: group
+    type(error_list_t),     intent(inout) :: errors
+    integer :: n
+
+    associate (body => input%bodies(number))
+      n = size(outline(body, input%discretisation%spacing), 2)
+      if (n == 0) return   ! that has been reported
+      if (body%shape == 'circle') then
+        if (is_given(group, 'edge')) call errors%add('a circle has no edges', &
+          where=place_of(group, 'edge'), found=integer_text(edge), allowed='body alone: all round')
+      else if (edge > n) then
+        call errors%add('the body '''//body%name//''' has no such edge', &
+          where=place_of(group, 'edge'), found=integer_text(edge), &
+          allowed='1 to '//integer_text(n))
+      end if
+    end associate
+  end subroutine check_number
+
+  !> What pressure k acts on, where it names a body.
+  subroutine check_pressed_edges(input, k, group, errors)
+    type(input_t),          intent(in)    :: input
+    integer,                intent(in)    :: k
+    type(namelist_group_t), intent(in)    :: group
+    type(error_list_t),     intent(inout) :: errors
+    integer :: number
+
+    associate (p => input%pressures(k))
+      if (.not. is_given(group, 'body')) then
+        call add_useless(group, 'edge', 'without body', errors)
+        return
+      end if
+      if (p%body == '') return
+      if (is_given(group, 'side')) call errors%add('a pressure on a side and on a body', &
+        where=place_of(group, 'body'), found='both', allowed='side, or body with or without edge')
+      if (is_given(group, 'span') .and. .not. is_given(group, 'edge')) call errors%add( &
+        'a span on all edges of a body', where=place_of(group, 'span'), found='no edge', &
+        allowed='a span along one edge')
+      number = body_number(input, p%body)
+      if (number == 0) then
+        call report_unknown(input, p%body, group, errors)
+      else
+        call check_number(input, number, p%edge, group, errors)
+      end if
+    end associate
+  end subroutine check_pressed_edges
 
   !> An edge with two boundaries.
   subroutine check_twice(boundaries, k, group, errors)

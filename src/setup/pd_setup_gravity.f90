@@ -6,7 +6,7 @@ module pd_setup_gravity
   use pd_input_types, only: input_t
   use pd_kinds, only: wp
   use pd_model, only: model_t
-  use pd_setup_loads, only: taken
+  use pd_setup_surface, only: taken
   use pd_text, only: short_number
   implicit none
   private

@@ -4,9 +4,8 @@
 !> the body.
 module pd_setup_loads
   use pd_affine_support, only: new_affine_support
-  use pd_edge_weights, only: find_edge_weights
-  use pd_edges, only: edge_t, outline_edges
   use pd_errors, only: error_list_t
+  use pd_input_shapes, only: body_number
   use pd_input_types, only: boundary_input_t, input_t, pressure_input_t
   use pd_kinds, only: wp
   use pd_loaded_platen, only: new_loaded_platen
@@ -14,14 +13,15 @@ module pd_setup_loads
   use pd_model, only: model_t
   use pd_platens, only: new_platens
   use pd_point_sets, only: boundary_set, columns_of, point_set_t, side_t
-  use pd_pressure, only: new_pressure, pressure_t, spread_on_side, surface_t, surface_vectors
+  use pd_pressure, only: new_pressure, pressure_t, spread_on_edges, spread_on_side, surface_t
   use pd_rigid_support, only: new_rigid_support
+  use pd_setup_surface, only: edges_of, find_surface, taken
   use pd_sides, only: normal_axis, side_number
   use pd_sliding_support, only: new_sliding_support
   use pd_stages, only: stage_t
   use pd_supports, only: support_t
   use pd_tables, only: new_ramp, new_table, table_t
-  use pd_text, only: number_text
+  use pd_text, only: integer_text, number_text
   implicit none
   private
 
@@ -107,15 +107,6 @@ contains
     end associate
   end subroutine new_support
 
-  !> The components in which a boundary transfers forces; in the others the body slides.
-  pure function taken(boundary)
-    type(boundary_input_t), intent(in) :: boundary
-    logical :: taken(2)
-
-    taken = .true.
-    if (boundary%contact == 'smooth') taken = [1, 2] == boundary%axis
-  end function taken
-
   !> Length of a side that carries x and y of a traction [m]: of the body, and of the layers at its
   !> ends where they slide along it and so stand for a body that goes on.
   pure function loaded_lengths(given, side, owner) result(length)
@@ -174,19 +165,20 @@ contains
 
     allocate (model%loads%items(count(stage%has_pressure)))
     if (size(model%loads%items) == 0) return
-    call find_surface(input%boundaries, model, surface)
+    call find_surface(input, stage, model, surface)
     n = 0
     do k = 1, size(input%pressures)
       if (.not. stage%has_pressure(k)) cycle
       n = n + 1
-      call new_pressure_load(input%pressures(k), stage%pressure_since(k), surface, model, &
+      call new_pressure_load(input, k, stage%pressure_since(k), surface, model, &
         model%loads%items(n)%load, errors)
     end do
   end subroutine set_up_loads
 
-  !> A pressure on a side of the body.
-  subroutine new_pressure_load(given, since, surface, model, load, errors)
-    type(pressure_input_t), intent(in)    :: given
+  !> Pressure number k, on a side or on edges of a body.
+  subroutine new_pressure_load(input, k, since, surface, model, load, errors)
+    type(input_t),          intent(in)    :: input
+    integer,                intent(in)    :: k
     real(wp),               intent(in)    :: since    !! time at which it sets in [s]
     type(surface_t),        intent(in)    :: surface
     type(model_t),          intent(in)    :: model
@@ -194,40 +186,35 @@ contains
     type(error_list_t),     intent(inout) :: errors
     type(pressure_t) :: pressure
 
-    pressure = new_pressure(given%name, given%side, given%value, given%span, given%ramp_time)
-    pressure%factor = new_ramp(given%ramp_time, since)
-    call spread_on_side(surface, model%body%sides(side_number(given%side)), pressure)
-    pressure%points = model%operators%storage%row(pressure%points)
-    if (size(pressure%points) == 0) &
-      call errors%add('a pressure acts on no point', '&pressure name = '//given%name)
+    associate (given => input%pressures(k))
+      pressure = new_pressure(given%name, place_in_words(given), given%value, given%span, &
+        given%ramp_time)
+      pressure%factor = new_ramp(given%ramp_time, since)
+      if (given%body == '') then
+        call spread_on_side(surface, model%body%sides(side_number(given%side)), pressure)
+      else
+        call spread_on_edges(surface, edges_of(input, model%spacing, body_number(input, &
+          given%body), given%edge, surface%weights%edges%number), pressure)
+      end if
+      pressure%points = model%operators%storage%row(pressure%points)
+      if (size(pressure%points) == 0) &
+        call errors%add('a pressure acts on no point', '&pressure name = '//given%name)
+    end associate
     allocate (load, source=pressure)
   end subroutine new_pressure_load
 
-  !> The edges of body and layers, and the part of N_i that belongs to each.
-  subroutine find_surface(boundaries, model, surface)
-    type(boundary_input_t), intent(in)    :: boundaries(:)
-    type(model_t),          intent(inout) :: model
-    type(surface_t),        intent(out)   :: surface
-    type(edge_t), allocatable :: edges(:)
-    real(wp),     allocatable :: vectors(:, :)   ! N in the rows of fields (n,2) [m]
-    integer :: i
+  !> What a pressure acts on, for its description.
+  pure function place_in_words(given) result(text)
+    type(pressure_input_t), intent(in) :: given
+    character(:), allocatable :: text
 
-    allocate (vectors(model%operators%n, 2), source=0.0_wp)
-    call surface_vectors(model%operators, model%points%volume, vectors)
-    associate (body => model%body)
-      surface%spacing = model%spacing
-      surface%delta = model%delta
-      surface%position = body%position
-      surface%in_body = body%boundary == 0
-      allocate (surface%free(body%n, 2), source=.true.)
-      do i = 1, body%n
-        if (body%boundary(i) > 0) surface%free(i, :) = .not. taken(boundaries(body%boundary(i)))
-      end do
-      call outline_edges(body, model%spacing, edges)
-      ! N_i is felt where families touch cut ones
-      call find_edge_weights(edges, body%position, vectors(model%operators%storage%row, :), &
-        surface%free, 2.0_wp * model%delta + model%spacing, model%spacing, surface%weights)
-    end associate
-  end subroutine find_surface
+    if (given%body == '') then
+      text = given%side
+    else if (given%edge > 0) then
+      text = 'edge '//integer_text(given%edge)//' of '//given%body
+    else
+      text = 'the rim of '//given%body
+    end if
+  end function place_in_words
 
 end module pd_setup_loads
