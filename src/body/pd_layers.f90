@@ -151,7 +151,8 @@ contains
 
   !> Mark the fictitious points beyond edges: beyond an edge along an axis whole rows as beyond a
   !> side; beyond an inclined one, or one shorter than a spacing, the empty places whose foot lies
-  !> on it, no further away than the horizon. Where two edges with layers meet, the corner outside of both is filled too.
+  !> on it, no further away than the horizon. Where two edges with layers meet, the corner outside of
+  !> both is filled too.
   subroutine fill_edges(layer, layers, lattice, places)
     type(layer_t),   intent(in)    :: layer
     type(layer_t),   intent(in)    :: layers(:)
