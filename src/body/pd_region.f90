@@ -266,7 +266,7 @@ contains
     real(wp) :: x(2), y
     integer  :: i, k
 
-    cuts = ends
+    allocate (cuts, source=ends)
     do i = 1, size(shapes)
       associate (v => shapes(i)%vertices, other => 3 - along)
         do k = 1, size(v, 2)
