@@ -322,10 +322,10 @@ contains
 
     heights = [low(2), high(2)]
     do i = 1, size(edges, 2)
-      slopes(i) = (edges(3, i) - edges(1, i)) / max(tiny(1.0_wp), edges(4, i) - edges(2, i))
       call add(edges(2, i))
       call add(edges(4, i))
       if (.not. edges(4, i) > edges(2, i)) cycle
+      slopes(i) = (edges(3, i) - edges(1, i)) / (edges(4, i) - edges(2, i))
       if (abs(slopes(i)) > 0.0_wp) then
         call add(edges(2, i) + (low(1) - edges(1, i)) / slopes(i))
         call add(edges(2, i) + (high(1) - edges(1, i)) / slopes(i))

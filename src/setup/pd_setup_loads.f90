@@ -14,6 +14,7 @@ module pd_setup_loads
   use pd_point_sets, only: boundary_set, columns_of, lines_below, point_set_t, side_t
   use pd_pressure, only: new_pressure, pressure_t, spread_pressure, surface_t, surface_vectors
   use pd_rigid_support, only: new_rigid_support
+  use pd_setup_materials, only: is_bearing
   use pd_sides, only: normal_axis, side_number
   use pd_sliding_support, only: new_sliding_support
   use pd_supports, only: support_t
@@ -81,7 +82,7 @@ contains
       else if (size(b%traction) > 0) then
         allocate (support, source=new_loaded_platen(set, taken(b), b%traction, &
           loaded_lengths(given, body%sides(side_number(b%side)), body%boundary), b%ramp_time))
-      else if (b%contact == 'smooth' .and. (size(b%span) > 0 .or. b%edge > 0)) then
+      else if (is_bearing(b)) then
         columns = columns_of(body%boundary, body%place, k, b%axis, &
           ceiling(model%delta / model%spacing - 1.0e-6_wp))
         do c = 1, size(columns, 2)
@@ -212,8 +213,10 @@ contains
       allocate (surface%slides(body%n), source=.true.)
       do i = 1, body%n
         if (body%boundary(i) == 0) cycle
-        components = taken(boundaries(body%boundary(i)))
-        surface%slides(i) = .not. components(surface%side%axis)
+        associate (b => boundaries(body%boundary(i)))
+          components = taken(b)
+          surface%slides(i) = .not. (components(surface%side%axis) .or. is_bearing(b))
+        end associate
       end do
     end associate
   end function surface_of
