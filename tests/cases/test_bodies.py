@@ -232,3 +232,17 @@ def test_points_need_check(perigeo, tmp_path):
     done = perigeo(["--points", "p.txt", "run.nml"], tmp_path)
     assert done.returncode == 1
     assert "--points goes with --check" in done.stderr
+
+
+def test_a_pressure_acts_beside_bearings_on_the_body_alone(run_case, tmp_path):
+    """A wall of soil continues the body and is pressed too; a bearing is no part of it."""
+    text = HEAD + "&body name = 'b', x_min = 0, x_max = 2, y_min = 0, y_max = 2 /\n"
+    text += "&pressure name = 'p', side = 'top', value = 1e3 /\n&boundary name = 'w', "
+    soil = run_case(text + "side = 'left', contact = 'smooth' /\n", tmp_path, "--check").stdout
+    bearing = run_case(
+        text + "body = 'b', edge = 4, contact = 'smooth' /\n", tmp_path, "--check"
+    ).stdout
+    assert "2 m of the body and layers that continue it" in soil
+    assert "2350 N/m in all" in soil
+    assert "2 m of the body, " in bearing
+    assert "2000 N/m in all" in bearing
