@@ -30,58 +30,69 @@ contains
     type(model_t),      intent(in)    :: model
     type(error_list_t), intent(inout) :: errors
     integer :: status, unit
+    logical :: good
 
     open (newunit=unit, file=path, status='replace', action='write', iostat=status)
-    if (status /= 0) then
-      call errors%add('the file cannot be written', path)
-      return
+    good = status == 0
+    if (good) then
+      call put(unit, '# perigeo points 1: lengths in m, forces in N/m', good)
+      call put_points(unit, input, model, good)
+      call put_loads(unit, model, good)
+      associate (flaw => input%imperfection)
+        if (flaw%amplitude > 0.0_wp) call put(unit, 'patch imperfection '// &
+          numbers([flaw%x, flaw%y, flaw%radius]), good)
+      end associate
+      close (unit, iostat=status)
+      good = good .and. status == 0
     end if
-    write (unit, '(a)', iostat=status) '# perigeo points 1: lengths in m, forces in N/m'
-    if (status == 0) call put_points(unit, input, model, status)
-    if (status == 0) call put_loads(unit, model, status)
-    associate (flaw => input%imperfection)
-      if (flaw%amplitude > 0.0_wp .and. status == 0) write (unit, '(a)', iostat=status) &
-        'patch imperfection '//numbers([flaw%x, flaw%y, flaw%radius])
-    end associate
-    if (status /= 0) call errors%add('the file cannot be written', path)
-    close (unit, iostat=status)
+    if (.not. good) call errors%add('the file cannot be written', path)
   end subroutine write_points
 
-  subroutine put_points(unit, input, model, status)
+  !> Write one line, unless one before it could not be written.
+  subroutine put(unit, line, good)
+    integer,      intent(in)    :: unit
+    character(*), intent(in)    :: line
+    logical,      intent(inout) :: good
+    integer :: status
+
+    if (.not. good) return
+    write (unit, '(a)', iostat=status) line
+    good = status == 0
+  end subroutine put
+
+  subroutine put_points(unit, input, model, good)
     integer,       intent(in)    :: unit
     type(input_t), intent(in)    :: input
     type(model_t), intent(in)    :: model
-    integer,       intent(inout) :: status
+    logical,       intent(inout) :: good
     character(:), allocatable :: boundary
     integer :: i
 
     associate (body => model%body)
       do i = 1, body%n
-        if (status /= 0) return
         boundary = '-'
         if (body%boundary(i) > 0) boundary = input%boundaries(body%boundary(i))%name
-        write (unit, '(a)', iostat=status) 'point '// &
+        call put(unit, 'point '// &
           numbers([body%position(i, 1), body%position(i, 2), body%volume(i)])//' '// &
-          input%bodies(body%part(i))%material//' '//boundary
+          input%bodies(body%part(i))%material//' '//boundary, good)
       end do
     end associate
   end subroutine put_points
 
   !> The forces of the pressures on their points.
-  subroutine put_loads(unit, model, status)
+  subroutine put_loads(unit, model, good)
     integer,       intent(in)    :: unit
     type(model_t), intent(in)    :: model
-    integer,       intent(inout) :: status
+    logical,       intent(inout) :: good
     integer :: i, k
 
     do k = 1, size(model%loads%items)
       select type (load => model%loads%items(k)%load)
       class is (pressure_t)
         do i = 1, size(load%points)
-          if (status /= 0) return
-          write (unit, '(a)', iostat=status) 'load '//load%name//' '// &
+          call put(unit, 'load '//load%name//' '// &
             numbers([model%points%position(load%points(i), 1), &
-                     model%points%position(load%points(i), 2), load%force(i, :)])
+                     model%points%position(load%points(i), 2), load%force(i, :)]), good)
         end do
       end select
     end do

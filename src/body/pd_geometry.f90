@@ -130,8 +130,8 @@ contains
     do k = 1, size(places%shapes)
       if (places%shapes(k)%solid) then
         if (.not. any(places%part == k)) call errors%add('a body leaves no point', &
-          place_of_body(places%shapes, k), 'later bodies cover it, or it lies between the places '// &
-          'of the lattice', 'at least one point of its own')
+          place_of_body(places%shapes, k), 'later bodies cover it, or it lies between '// &
+          'the places of the lattice', 'at least one point of its own')
       else
         box(:, 1) = minval(places%shapes(k)%vertices, 2)
         box(:, 2) = maxval(places%shapes(k)%vertices, 2)

@@ -62,17 +62,6 @@ contains
       on = covers(layer%side, side)
     end function on
 
-    !> Whether a layer lies on a whole side.
-    logical function any_on(side)
-      integer, intent(in) :: side
-      integer :: k
-
-      any_on = .false.
-      do k = 1, size(layers)
-        any_on = any_on .or. covers(layers(k)%side, side) .and. .not. allocated(layers(k)%span)
-      end do
-    end function any_on
-
     !> Layers beyond the points of column x, in direction step.
     subroutine fill_column(x, step)
       integer, intent(in) :: x, step
@@ -101,8 +90,8 @@ contains
         d => squares(2), first => places%line(left), last => places%line(right))
         columns = [first, last]
         if (.not. allocated(layer%span)) then
-          if (any_on(left) .and. owner(first, y) == 0) columns(1) = first - p
-          if (any_on(right) .and. owner(last, y) == 0) columns(2) = last + p
+          if (any_on(layers, left) .and. owner(first, y) == 0) columns(1) = first - p
+          if (any_on(layers, right) .and. owner(last, y) == 0) columns(2) = last + p
         end if
         do k = 1, p + 1
           if (k <= p) then
@@ -120,6 +109,18 @@ contains
     end subroutine fill_row
 
   end subroutine fill_layer
+
+  !> Whether a layer lies on a whole side.
+  pure logical function any_on(layers, side)
+    type(layer_t), intent(in) :: layers(:)
+    integer,       intent(in) :: side
+    integer :: k
+
+    any_on = .false.
+    do k = 1, size(layers)
+      any_on = any_on .or. covers(layers(k)%side, side) .and. .not. allocated(layers(k)%span)
+    end do
+  end function any_on
 
   !> The places along a side that are strictly inside the span of a layer, and the squares that it
   !> covers.
@@ -151,7 +152,8 @@ contains
 
   !> Mark the fictitious points beyond edges: beyond an edge along an axis whole rows as beyond a
   !> side; beyond an inclined one, or one shorter than a spacing, the empty places whose foot lies
-  !> on it, no further away than the horizon. Where two edges with layers meet, the corner outside of both is filled too.
+  !> on it, no further away than the horizon. Where two edges with layers meet, the corner outside
+  !> of both is filled too.
   subroutine fill_edges(layer, layers, lattice, places)
     type(layer_t),   intent(in)    :: layer
     type(layer_t),   intent(in)    :: layers(:)

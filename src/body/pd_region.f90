@@ -47,7 +47,7 @@ contains
     real(wp) :: middle
     integer  :: k, next
 
-    angles = directions(shapes, x, beside)
+    allocate (angles, source=directions(shapes, x, beside))
     part = 0
     do k = 1, size(angles)
       next = merge(1, k + 1, k == size(angles))
@@ -247,8 +247,8 @@ contains
     real(wp), allocatable :: edges(:, :), heights(:)
     integer :: k
 
-    edges = edges_near(shapes, low, high)
-    heights = heights_of(edges, low, high)
+    allocate (edges, source=edges_near(shapes, low, high))
+    allocate (heights, source=heights_of(edges, low, high))
     area = 0.0_wp
     do k = 2, size(heights)
       if (heights(k) > heights(k - 1)) area = area + area_of_slab(shapes, edges, low(1), high(1), &
@@ -266,7 +266,7 @@ contains
     real(wp) :: x(2), y
     integer  :: i, k
 
-    cuts = ends
+    allocate (cuts, source=ends)
     do i = 1, size(shapes)
       associate (v => shapes(i)%vertices, other => 3 - along)
         do k = 1, size(v, 2)
@@ -322,10 +322,10 @@ contains
 
     heights = [low(2), high(2)]
     do i = 1, size(edges, 2)
-      slopes(i) = (edges(3, i) - edges(1, i)) / max(tiny(1.0_wp), edges(4, i) - edges(2, i))
       call add(edges(2, i))
       call add(edges(4, i))
       if (.not. edges(4, i) > edges(2, i)) cycle
+      slopes(i) = (edges(3, i) - edges(1, i)) / (edges(4, i) - edges(2, i))
       if (abs(slopes(i)) > 0.0_wp) then
         call add(edges(2, i) + (low(1) - edges(1, i)) / slopes(i))
         call add(edges(2, i) + (high(1) - edges(1, i)) / slopes(i))

@@ -5,23 +5,16 @@ module pd_input_shapes
   use pd_input_types, only: body_input_t, boundary_input_t, input_t
   use pd_kinds, only: is_set, wp
   use pd_polygons, only: edge_axis, polygon_of_circle
-  use pd_sides, only: normal_axis
+  use pd_sides, only: normal_axis, outward
   implicit none
   private
 
-  public :: outline, find_extents, body_number, axis_of, on_lattice, circle_error
+  public :: outline, find_extents, body_number, axis_of, reaches_side, circle_error
 
   !> How far the polygon of a circle is from it at most [spacings].
   real(wp), parameter :: circle_error = 1.0e-4_wp
 
 contains
-
-  !> Whether a body consists of points of a lattice.
-  pure logical function on_lattice(body)
-    type(body_input_t), intent(in) :: body
-
-    on_lattice = body%shape == 'rectangle' .or. body%shape == 'polygon' .or. body%shape == 'circle'
-  end function on_lattice
 
   !> Vertices of a body (2,n) [m]. Rectangles begin at the lower left and go round
   !> counter-clockwise; a circle becomes a polygon of the same area.
@@ -117,5 +110,30 @@ contains
       axis = edge_axis(outline(body, input%discretisation%spacing), boundary%edge)
     end associate
   end function axis_of
+
+  !> Whether a boundary on edges of a body has one that lies on a side of the box around all bodies.
+  pure logical function reaches_side(input, boundary, side)
+    type(input_t),          intent(in) :: input
+    type(boundary_input_t), intent(in) :: boundary
+    character(*),           intent(in) :: side
+    real(wp), allocatable :: v(:, :)
+    real(wp) :: lower(2), upper(2), line
+    integer  :: axis, e, k
+    logical  :: known
+
+    reaches_side = .false.
+    k = body_number(input, boundary%body)
+    axis = normal_axis(side)
+    if (k == 0 .or. axis == 0) return
+    call find_extents(input%bodies, input%discretisation%spacing, lower, upper, known)
+    if (.not. known) return
+    line = merge(upper(axis), lower(axis), outward(side) > 0)
+    v = outline(input%bodies(k), input%discretisation%spacing)
+    do e = 1, size(v, 2)
+      if (boundary%edge > 0 .and. boundary%edge /= e) cycle
+      if (edge_axis(v, e) /= axis) cycle
+      if (abs(v(axis, e) - line) <= 1.0e-6_wp * maxval(upper - lower)) reaches_side = .true.
+    end do
+  end function reaches_side
 
 end module pd_input_shapes

@@ -5,7 +5,7 @@
 module pd_load_checks
   use pd_errors, only: error_list_t
   use pd_input_checks, only: add_missing, add_useless, is_cloud
-  use pd_input_shapes, only: find_extents
+  use pd_input_shapes, only: find_extents, reaches_side
   use pd_input_types, only: boundary_input_t, input_t
   use pd_input_values, only: group_named, is_given
   use pd_kinds, only: is_set, wp
@@ -134,7 +134,8 @@ contains
     if (input%pressures(k)%side == '') return
     do j = 1, size(input%boundaries)
       associate (b => input%boundaries(j))
-        if (b%side /= input%pressures(k)%side .and. b%side /= 'all') cycle
+        if (b%side /= input%pressures(k)%side .and. b%side /= 'all' &
+            .and. .not. reaches_side(input, b, input%pressures(k)%side)) cycle
         call errors%add('a pressure on a side with a boundary', where=place_of(group, 'side'), &
           found=''''//input%pressures(k)%side//''', where '''//b%name//''' lies', &
           allowed='a side without a boundary')

@@ -47,7 +47,7 @@ contains
       meaning='folder of the output files, relative to the working directory; created where ' &
       //'it does not exist'), self%output_dir)
     call visitor%text_key(key_t('operators', default='auto', choices='auto lattice list', &
-      also='''lattice'': only for rectangles', &
+      also='''lattice'': not for a cloud', &
       meaning='form of the non-local operators: ''lattice'' is several times faster and needs ' &
       //'a body on a lattice, ''list'' takes any points, ''auto'' chooses'), self%operators)
   end subroutine visit_run

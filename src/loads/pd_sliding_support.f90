@@ -8,8 +8,8 @@
 !> Source: doc/theory.md, section 7.
 module pd_sliding_support
   use pd_kinds, only: wp
-  use pd_rigid_support, only: new_rigid_support, rigid_support_t
   use pd_point_sets, only: point_set_t
+  use pd_rigid_support, only: new_rigid_support, rigid_support_t
   use pd_tables, only: table_t
   implicit none
   private

@@ -185,7 +185,8 @@ contains
     real(wp), parameter   :: near = 1.0e-6_wp
     real(wp), allocatable :: v(:, :), even(:, :)
 
-    v = outline(given, spacing)
+    allocate (v, source=outline(given, spacing))
+    allocate (even, mold=v)
     v = v - spread(origin, 2, size(v, 2))
     if (given%shape == 'rectangle') then
       even = real(nearest_count(v, spacing), wp)

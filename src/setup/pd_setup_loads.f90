@@ -15,6 +15,7 @@ module pd_setup_loads
   use pd_point_sets, only: boundary_set, columns_of, point_set_t, side_t
   use pd_pressure, only: new_pressure, pressure_t, spread_on_edges, spread_on_side, surface_t
   use pd_rigid_support, only: new_rigid_support
+  use pd_setup_materials, only: is_bearing
   use pd_setup_surface, only: edges_of, find_surface, taken
   use pd_sides, only: normal_axis, side_number
   use pd_sliding_support, only: new_sliding_support
@@ -93,7 +94,7 @@ contains
         allocate (support, source=new_loaded_platen(set, taken(b), b%traction, &
           loaded_lengths(given, body%sides(side_number(b%side)), body%boundary), b%ramp_time, &
           since))
-      else if (b%contact == 'smooth' .and. (size(b%span) > 0 .or. b%edge > 0)) then
+      else if (is_bearing(b)) then
         columns = columns_of(body%boundary, body%place, k, b%axis, &
           ceiling(model%delta / model%spacing - 1.0e-6_wp))
         do c = 1, size(columns, 2)

@@ -25,7 +25,7 @@ module pd_setup_materials
   implicit none
   private
 
-  public :: set_up_points, set_up_materials, set_up_relaxing_control
+  public :: set_up_points, set_up_materials, set_up_relaxing_control, is_bearing
 
 contains
 
@@ -109,7 +109,8 @@ contains
     end do
   end subroutine set_up_bearings
 
-  !> Whether the layers of a boundary only carry stress across themselves.
+  !> Whether the layers of a boundary only carry stress across themselves: they do not continue the
+  !> body.
   pure logical function is_bearing(boundary)
     type(boundary_input_t), intent(in) :: boundary
 

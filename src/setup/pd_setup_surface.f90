@@ -10,6 +10,7 @@ module pd_setup_surface
   use pd_model, only: model_t
   use pd_polygons, only: inside
   use pd_pressure, only: surface_t, surface_vectors
+  use pd_setup_materials, only: is_bearing
   use pd_stages, only: stage_t
   implicit none
   private
@@ -38,8 +39,10 @@ contains
       surface%in_body = body%boundary == 0
       allocate (surface%free(body%n, 2), source=.true.)
       do i = 1, body%n
-        if (body%boundary(i) > 0) &
-          surface%free(i, :) = .not. taken(input%boundaries(body%boundary(i)))
+        if (body%boundary(i) == 0) cycle
+        associate (b => input%boundaries(body%boundary(i)))
+          surface%free(i, :) = .not. (taken(b) .or. is_bearing(b))
+        end associate
       end do
       if (all_rectangles(input) .and. .not. any_names_body(input)) then
         call outline_edges(body, model%spacing, edges)

@@ -100,7 +100,26 @@ BOTH = changed(BODY, kinematic_modulus="-1.0e6").replace(
     "kinematic_modulus", "isotropic_modulus = -0.8e6, kinematic_modulus"
 )
 
+# A slope with a tunnel: a footing that slides, a wall on an inclined edge, a rim that moves.
+POLYGON = """\
+&run name = 'case', output_dir = 'out' /
+&discretisation spacing = 0.1, horizon = 0.3, volumes = 'tributary' /
+&body name = 'ground', shape = 'polygon'
+  vertices = 0.0, 0.0, 2.6, 0.0, 2.6, 0.77, 1.5, 1.2, 0.7, 1.2, 0.0, 0.9 /
+&body name = 'tunnel', shape = 'circle', x = 1.1, y = 0.5, radius = 0.21, role = 'hole' /
+&material model = 'j2', density = 2000.0, youngs_modulus = 50.0e6, poissons_ratio = 0.3
+  yield_stress = 5.0e3, isotropic_modulus = 1.0e5 /
+&boundary name = 'base', side = 'bottom' /
+&boundary name = 'footing', body = 'ground', edge = 4, contact = 'smooth', velocity = 0.0, -0.02 /
+&boundary name = 'wall', body = 'ground', edge = 5, velocity = 0.004, -0.01 /
+&boundary name = 'rim', body = 'tunnel', contact = 'affine'
+  velocity_gradient = 0.0, 0.0, 0.0, 0.01 /
+&integration end_time = 0.1, damping = 2.0e4 /
+&output history_count = 40, frame_count = 2 /
+"""
+
 CASES = {
+    "polygon": POLYGON,
     "lattice": BODY + PLATENS + PATCH,
     "list": changed(BODY, **LISTED) + PLATENS + PATCH,
     "lattice_control": L_SHAPE + TABLES + CONTROL,
@@ -121,7 +140,7 @@ CASES = {
     "sideways": BODY + SIDEWAYS + PATCH,
     "materials": BODY.replace("&material", "&material name = 'soil',") + LAYERS + TABLES + CONTROL,
 }
-RESTARTED = ("field", "loaded", "cloud", "materials")
+RESTARTED = ("field", "loaded", "cloud", "materials", "polygon")
 
 
 def cloud():

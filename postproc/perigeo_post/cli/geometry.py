@@ -20,8 +20,10 @@ from .options import Arguments, add_output, draw_figure
 def add_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("file", metavar="RUN.nml", type=Path, help="input file")
     add_output(parser)
-    parser.add_argument("--set", metavar="GROUP.KEY=VALUE", dest="settings", action="append",
-                        default=[], help="a value in place of that of the file, as often as needed")  # fmt: skip
+    parser.add_argument(
+        "--set", metavar="GROUP.KEY=VALUE", dest="settings", action="append", default=[],
+        help="a value in place of that of the file, as often as needed",
+    )  # fmt: skip
     parser.add_argument(
         "--program", metavar="PATH", type=Path,
         help="the program perigeo (default: PERIGEO_BIN, bin/perigeo above RUN.nml, or on PATH)",

@@ -36,8 +36,6 @@ def geometry_figure(model: ModelPoints, title: str = "") -> Figure:
         axes.set_aspect("equal")
         axes.set_xlim(low[0], high[0])
         axes.set_ylim(low[1], high[1])
-        axes.margins(0.02)
-        axes.autoscale(enable=None)
         axes.set_xlabel("x [m]")
         axes.set_ylabel("y [m]")
         if title:
