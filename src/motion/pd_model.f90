@@ -72,8 +72,8 @@ contains
       call reference_ends(model%platens, t, frame%lower, frame%upper)
   end function damping_frame
 
-  !> State at t = 0: undeformed, with the initial stress where there is one, moving with the frame of the damping, supports with their own
-  !> velocity; loads without a ramp act already.
+  !> State at t = 0: undeformed, with the initial stress where there is one, moving with the frame
+  !> of the damping, supports with their own velocity; loads without a ramp act already.
   subroutine start(model, state)
     type(model_t), intent(inout) :: model
     type(state_t), intent(out)   :: state

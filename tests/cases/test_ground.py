@@ -130,6 +130,15 @@ def test_an_initial_stress_stays_at_rest(results, method, operators, gravity):
     assert GAMMA * AREA < rows["bottom_force_y"][0] < GAMMA * (AREA + LAYERS)
 
 
+def test_a_free_side_under_stress_is_told(run_case, tmp_path):
+    open_side = CLAY.replace("&boundary name = 'right', side = 'right', contact = 'smooth' /\n", "")
+    done = run_case(open_side, tmp_path, "--check")
+    assert done.returncode == 0, done.stderr
+    assert "warning: &initial_stress k0: the right side has no boundary" in done.stdout
+    assert "the left side" not in done.stdout
+    assert "side has no boundary" not in run_case(CLAY, tmp_path, "--check").stdout
+
+
 def test_a_footing_on_ground_under_stress_keeps_the_balance_of_energy(results):
     text = CLAY.replace("increments = 4", "increments = 40") + FOOTING + "\n"
     loaded, fields = results(text)
