@@ -211,6 +211,7 @@ contains
           materials%list(k)%name//'''; &body material chooses one', path)
       end do
     end associate
+    if (is_set(run%input%initial_stress%k0)) call look_at_ground(run)
     if (.not. allocated(run%model%body%place)) call look_at_cloud(run)
     do k = 1, size(run%model%loads%items)
       associate (load => run%model%loads%items(k)%load)
@@ -219,6 +220,25 @@ contains
       end associate
     end do
   end subroutine look_at_model
+
+  !> Warn of ground under horizontal stress that nothing bears but the load that holds it.
+  subroutine look_at_ground(run)
+    type(run_t), intent(inout) :: run
+    character(5), parameter :: walls(2) = [character(5) :: 'left', 'right']
+    logical :: borne
+    integer :: j, k
+
+    if (.not. run%input%initial_stress%k0 > 0.0_wp) return
+    do k = 1, size(walls)
+      borne = .false.
+      do j = 1, size(run%input%boundaries)
+        borne = borne .or. run%input%boundaries(j)%side == walls(k) &
+          .or. run%input%boundaries(j)%side == 'all'
+      end do
+      if (.not. borne) call run%warnings%add('the '//trim(walls(k))//' side has no boundary: '// &
+        'its initial stress is held for good as if the ground went on there', '&initial_stress k0')
+    end do
+  end subroutine look_at_ground
 
   !> Warn of a cloud of points whose weights or zero-energy modes make stresses too small.
   subroutine look_at_cloud(run)

@@ -133,9 +133,9 @@ contains
     integer :: k
 
     associate (field => input%random_field)
-      if (is_set(field%coefficient_of_variation)) call summary%add('random field', 'coefficient of variation '// &
-        number(field%coefficient_of_variation)//', correlation length '// &
-        number(field%correlation_length)//' m, seed '//whole(field%seed))
+      if (is_set(field%coefficient_of_variation)) call summary%add('random field', &
+        'coefficient of variation '//number(field%coefficient_of_variation)// &
+        ', correlation length '//number(field%correlation_length)//' m, seed '//whole(field%seed))
       do k = 1, size(input%materials)
         associate (given => input%materials(k), several => size(input%materials) > 1)
           if (abs(given%youngs_modulus_gradient) > 0.0_wp) &
@@ -157,7 +157,7 @@ contains
     type(model_t),          intent(in)    :: model
     type(summary_t),        intent(inout) :: summary
     character(:), allocatable :: of_which
-    logical, allocatable :: inside(:)
+    logical :: inside(model%operators%n)
 
     inside = model%materials%rows_of(k, model%operators%n) .and. model%points%in_body > 0.0_wp
     if (.not. any(inside)) return

@@ -138,7 +138,11 @@ contains
     type(key_t),           intent(in)    :: key
     real(wp), allocatable, intent(inout) :: x(:)
 
-    if (size(x) > 0) call self%put(key, numbers_text(x))
+    if (size(x) > 0) then
+      call self%put(key, numbers_text(x))
+    else
+      call self%put(key, '')
+    end if
   end subroutine print_list
 
   subroutine print_vector(self, key, x)

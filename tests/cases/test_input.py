@@ -115,6 +115,70 @@ MISTAKES = {
         "&boundary name = 'one', side = 'left', span = 0.1, 0.5, traction = 1.0, 0.0 /\n&output",
         "a traction on a part of a side; found: both; allowed: a span or a traction",
     ),
+    "gravity without an acceleration": (
+        "&output",
+        "&gravity acceleration = 0.0, 0.0 /\n&output",
+        "&gravity acceleration: gravity without an acceleration; found: 0.0, 0.0; allowed: not 0",
+    ),
+    "initial stress without weight": (
+        "&output",
+        "&initial_stress unit_weight = 0.0, k0 = 0.5 /\n&output",
+        "an initial stress without weight and surcharge; found: 0; allowed: unit_weight or",
+    ),
+    "initial stress without k0": (
+        "&output",
+        "&initial_stress unit_weight = 2.0e4 /\n&output",
+        "&initial_stress k0: the key is missing; allowed: >= 0",
+    ),
+    "unit weight that is not that of gravity": (
+        "&output",
+        "&gravity acceleration = 0.0, -10.0 /\n"
+        "&initial_stress unit_weight = 1.9e4, k0 = 0.5 /\n&output",
+        "the unit weight is not that of gravity; found: 19000.0; allowed: 20000.0 [N/m^3], the den",
+    ),
+    "gravity that rises beside an initial stress": (
+        "&output",
+        "&gravity acceleration = 0.0, -10.0, ramp_time = 1.0 /\n"
+        "&initial_stress unit_weight = 2.0e4, k0 = 0.5 /\n&output",
+        "gravity that rises beside an initial stress that it makes; found: 1.0; allowed: 0: the",
+    ),
+    "gravity that does not point downwards": (
+        "&output",
+        "&gravity acceleration = 1.0, -10.0 /\n"
+        "&initial_stress unit_weight = 2.0e4, k0 = 0.5 /\n&output",
+        "an initial stress needs gravity that points downwards; found: 1.0, -10.0; allowed: 0 and",
+    ),
+    "surface below the body": (
+        "&output",
+        "&initial_stress unit_weight = 2.0e4, k0 = 0.5, surface_y = 0.5 /\n&output",
+        "the body reaches above the surface of the ground; found: 0.5; allowed: at least the top",
+    ),
+    "pressure that is not that of the initial stress": (
+        "&output",
+        "&pressure name = 'p', side = 'left', value = 1.0e4 /\n"
+        "&initial_stress unit_weight = 2.0e4, k0 = 0.5, surcharge = 1.0e4 /\n&output",
+        "a load that acts from the start is not that of the initial stress; found: 10000.0; allow",
+    ),
+    "two probes of one name": (
+        "&output",
+        "&probe name = 'a', x = 0.1, y = 0.1 /\n&probe name = 'a', x = 0.2, y = 0.1 /\n&output",
+        "&probe name: two probes have the same name; found: 'a'; allowed: each name once",
+    ),
+    "probe with the name of a boundary": (
+        "&output",
+        "&probe name = 'top', x = 0.1, y = 0.1 /\n&output",
+        "&probe name: a probe has the name of a boundary; found: 'top'; allowed: each name once",
+    ),
+    "probe with the name of another column": (
+        "&output",
+        "&probe name = 'mean', x = 0.1, y = 0.1 /\n&output",
+        "&probe name: a probe has the name of other columns; found: 'mean'",
+    ),
+    "height of a gradient that is not there": (
+        "yield_stress = 0.15e6",
+        "reference_y = 1.0, yield_stress = 0.15e6",
+        "&material reference_y: the key has no effect without a gradient; allowed: leave it out",
+    ),
     "motion and traction": (
         "velocity = 0.0, -0.01",
         "velocity = 0.0, -0.01, traction = 0.0, -1.0",
