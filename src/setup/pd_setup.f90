@@ -23,9 +23,9 @@ contains
 
   !> Operators, materials, supports, loads, damping.
   !>
-  !> Errors: a cut that crosses no bond, points that coincide, families that are too small, no free point, a pressure that acts
-  !> on no point, a platen under a traction with points of different density, a relaxing control of
-  !> families whose bonds are all equally long.
+  !> Errors: a cut that no bond crosses, points that coincide, families that are too small, no free
+  !> point, a pressure that acts on no point, a platen under a traction with points of different
+  !> density, a relaxing control of families whose bonds are all equally long.
   subroutine set_up_model(input, model, errors)
     type(input_t),      intent(in)    :: input
     type(model_t),      intent(inout) :: model    !! in: with its body

@@ -18,6 +18,7 @@ import re
 import subprocess
 import sys
 from datetime import date
+from functools import partial
 from pathlib import Path
 
 from bench_cases import (
@@ -320,11 +321,10 @@ def table_of_slots(data: dict[str, object], few: int, turns: int) -> str:
     for columns, lines, steps in ((51, 101, 1200), (201, 401, 80)):
         middle = 0.5 + 0.5 / (columns - 1)
         slot = f"&cut x = {middle!r}, {middle!r}, y = 0.5, 1.5 /\n"
+        case = partial(lattice_case, columns, lines, 4, steps // few)
         for name, control in controls.items():
             whole, slotted = best(
-                turns,
-                lambda c=control: lattice_case(columns, lines, 4, steps // few, more=c),
-                lambda c=control: lattice_case(columns, lines, 4, steps // few, more=slot + c),
+                turns, partial(case, more=control), partial(case, more=slot + control)
             )
             label = f"{columns} x {lines}, control {name}"
             data[f"slot {label}"] = slotted

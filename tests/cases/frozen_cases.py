@@ -124,7 +124,10 @@ CASES = {
     "conical": BODY.replace("horizon =", "influence = 'conical', horizon =") + PLATENS + PATCH,
     "cloud": CLOUD + PLATENS + PATCH + CONTROL,
     "sideways": BODY + SIDEWAYS + PATCH,
-    "materials": ACROSS_AIR.replace("&material", "&material name = 'soil',") + LAYERS + TABLES + CONTROL,
+    "materials": ACROSS_AIR.replace("&material", "&material name = 'soil',")
+    + LAYERS
+    + TABLES
+    + CONTROL,
     "sight": L_SHAPE.replace("'distance'", "'line_of_sight'") + CUT + TABLES,
 }
 RESTARTED = ("field", "loaded", "cloud", "materials", "sight")

@@ -101,7 +101,8 @@ def test_list_and_lattice_agree_on_a_body_with_a_slot(run_case, tmp_path, contro
     for name in one:
         if name in ("energy_error", "unbalanced_force"):
             continue  # differences of what nearly cancels
-        assert np.allclose(one[name], other[name], rtol=0, atol=1e-9 * np.abs(one[name]).max()), name
+        scale = np.abs(one[name]).max()
+        assert np.allclose(one[name], other[name], rtol=0, atol=1e-9 * scale), name
 
 
 def test_threads_keep_the_bits_of_a_body_with_a_slot(run_case, tmp_path):
@@ -148,9 +149,11 @@ def cloud(folder):
                 file.write(f"{x:.5f} {y:.5f} 0.01 {name}\n")
 
 
-CLOUD = BAR.replace("&body", "&body shape = 'file', file = 'cloud.txt',").replace(
-    ", side = 'bottom'", ""
-).replace(", side = 'top'", "")
+CLOUD = (
+    BAR.replace("&body", "&body shape = 'file', file = 'cloud.txt',")
+    .replace(", side = 'bottom'", "")
+    .replace(", side = 'top'", "")
+)
 
 
 def test_a_cloud_that_is_cut_through_carries_no_force(run_case, tmp_path):
@@ -194,12 +197,14 @@ REFUSED = {
         "allowed: leave it out",
     ),
     "a point alone": (
-        BAR.replace(", side = 'bottom'", ", side = 'left'").replace("0.0, 0.05", "0.05, 0.0")
+        BAR.replace(", side = 'bottom'", ", side = 'left'")
+        .replace("0.0, 0.05", "0.05, 0.0")
         .replace(", side = 'top'", ", side = 'right'")
         + "&cut x = 0.46, 0.54, y = 2.1, 1.85 /\n&cut x = 0.46, 0.56, y = 1.85, 1.85 /\n"
         + "&cut x = 0.56, 0.54, y = 1.8, 2.1 /\n",
         3,
-        "point 349 at (0.5000000, 2.000000) m: the shape tensor is singular: the family is too small or lies on one line; allowed: ",
+        "point 349 at (0.5000000, 2.000000) m: the shape tensor is singular: the family is too "
+        "small or lies on one line; allowed: ",
     ),
 }
 
