@@ -175,20 +175,20 @@ contains
   pure logical function crosses(self, k, i, j)
     class(sight_t), intent(in) :: self
     integer,        intent(in) :: k, i, j
-    real(wp) :: along(2), length, from, to, at(2), part, close
+    real(wp) :: along(2), length, from, to, at(2), part, margin
 
-    close = 1.0e-6_wp * self%delta
+    margin = 1.0e-6_wp * self%delta
     associate (a => self%cuts(1:2, k), b => self%cuts(3:4, k), &
       x => self%position(min(i, j), :), y => self%position(max(i, j), :))
       length = norm2(b - a)
       along = (b - a) / length
       from = along(1) * (x(2) - a(2)) - along(2) * (x(1) - a(1))   ! to the left of the cut
       to = along(1) * (y(2) - a(2)) - along(2) * (y(1) - a(1))
-      crosses = (from >= -close) .neqv. (to >= -close)
+      crosses = (from >= -margin) .neqv. (to >= -margin)
       if (.not. crosses) return
       part = min(1.0_wp, max(0.0_wp, from / (from - to)))
       at = x + part * (y - x)
-      crosses = abs(dot_product(along, at - a) - 0.5_wp * length) <= 0.5_wp * length + close
+      crosses = abs(dot_product(along, at - a) - 0.5_wp * length) <= 0.5_wp * length + margin
     end associate
   end function crosses
 

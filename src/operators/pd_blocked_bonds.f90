@@ -33,6 +33,7 @@ module pd_blocked_bonds
     procedure :: take_out_of_divergence
     procedure :: take_out_of_near
     procedure :: take_out_of_residual
+    procedure :: take_out_of_differences
     procedure :: recount
     procedure :: reshape_rows
     procedure :: recount_zero_energy
@@ -218,7 +219,33 @@ contains
     call take_out(self, self%residual, lo, hi, x, total)
   end subroutine take_out_of_residual
 
-  !> The same with any weights.
+  !> The same of both components of a field.
+  pure subroutine take_out_of_differences(self, lo, hi, x, total)
+    class(blocked_bonds_t), intent(in) :: self
+    integer,  intent(in) :: lo, hi
+    real(wp), intent(in), contiguous :: x(:, :)   !! (n,2)
+    real(wp), intent(inout) :: total(:, :)        !! (:,2); row 1 is row lo
+    integer     :: a, b, i, j, k, o
+    integer(i8) :: e
+    real(wp)    :: sx, sy
+
+    call self%find_rows(lo, hi, a, b)
+    do k = a, b
+      i = self%row(k)
+      sx = 0.0_wp
+      sy = 0.0_wp
+      do e = self%first(k), self%first(k + 1) - 1
+        o = self%offset(e)
+        j = i + self%shift(o)
+        sx = sx + self%residual(o) * x(j, 1)
+        sy = sy + self%residual(o) * x(j, 2)
+      end do
+      total(i - lo + 1, 1) = total(i - lo + 1, 1) - sx
+      total(i - lo + 1, 2) = total(i - lo + 1, 2) - sy
+    end do
+  end subroutine take_out_of_differences
+
+  !> The same of one field with any weights.
   pure subroutine take_out(self, weight, lo, hi, x, total)
     type(blocked_bonds_t), intent(in) :: self
     real(wp), intent(in) :: weight(:)                 !! (offsets)

@@ -308,9 +308,8 @@ contains
     do k = 1, 2
       call add_radial_sums(self%residual, lo, hi, self%residual_weight, x(:, k), &
         s(:hi - lo + 1, k))
-      if (allocated(self%blocked)) &
-        call self%blocked%take_out_of_residual(lo, hi, x(:, k), s(:hi - lo + 1, k))
     end do
+    if (allocated(self%blocked)) call self%blocked%take_out_of_differences(lo, hi, x, s)
   end subroutine difference_sums_block
 
   !> Weights of S, and the factor of x~_i in it: the sums over the shares, over the own share.

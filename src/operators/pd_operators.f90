@@ -46,7 +46,7 @@ module pd_operators
     real(wp), allocatable :: weight_sum(:)                !! W_i = sum_j omega V_j (n) [m^2]
     real(wp), allocatable :: k_inverse(:, :)              !! K^-1 (n,3) xx yy xy [1/m^4]
     real(wp), allocatable :: control(:)                   !! c (n) [N/m^6]; not allocated: none
-    integer(i8) :: hidden_bonds = 0_i8                    !! directed ones that air and cuts leave out
+    integer(i8) :: hidden_bonds = 0_i8                    !! directed, over air or cuts: left out
     logical :: sums_whole_control = .false.               !! Z holds the affine part too
     type(relaxing_t), allocatable :: relaxing             !! not allocated: none
     real(wp), allocatable, private :: force_tensor(:, :)  !! A (n,4), weighed [N/m^6]

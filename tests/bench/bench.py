@@ -6,6 +6,7 @@ call come from one machine in one go; ratios mean more than times, which are noi
 
     bench.py [--quick] [--publish]
     bench.py --alignment             only what arrays at whole lines of the cache gain
+    bench.py --slot                  only what a body with a slot costs
 """
 
 from __future__ import annotations
@@ -17,11 +18,13 @@ import re
 import subprocess
 import sys
 from datetime import date
+from functools import partial
 from pathlib import Path
 
 from bench_cases import (
     CONTROL,
     KERNELS,
+    PLAIN,
     PROGRAM,
     RESULTS,
     ROOT,
@@ -41,6 +44,7 @@ MACHINE = ROOT / "build" / "opt" / "bench" / "machine"
 PAGE = ROOT / "doc" / "performance.md"
 
 ALIGNMENT = "Arrays at whole lines of the cache"
+SLOT = "A slot over half of the height of a specimen, m = 4"
 IN_CONTROL = {"method = 'none'": "method = 'silling', factor = 0.0125"}
 IN_RELAXING = {"method = 'none'": "method = 'relaxing'"}
 
@@ -306,6 +310,37 @@ def table_of_alignment(data: dict[str, object], few: int) -> str:
     return table(["case", "ns/point-step", "with ALIGNED=0", "gain %"], rows)
 
 
+def table_of_slots(data: dict[str, object], few: int, turns: int) -> str:
+    """Specimens with a slot, whose bonds are blocked, and without: runs by turns."""
+    controls = {
+        "none": PLAIN,
+        "Silling": CONTROL,
+        "relaxing": "&stabilisation method = 'relaxing' /\n",
+    }
+    rows = []
+    for columns, lines, steps in ((51, 101, 1200), (201, 401, 80)):
+        middle = 0.5 + 0.5 / (columns - 1)
+        slot = f"&cut x = {middle!r}, {middle!r}, y = 0.5, 1.5 /\n"
+        case = partial(lattice_case, columns, lines, 4, steps // few)
+        for name, control in controls.items():
+            whole, slotted = best(
+                turns, partial(case, more=control), partial(case, more=slot + control)
+            )
+            label = f"{columns} x {lines}, control {name}"
+            data[f"slot {label}"] = slotted
+            share = 100.0 * (1.0 - slotted["bonds"] / whole["bonds"])
+            rows.append(
+                [
+                    label,
+                    f"{share:.2f}",
+                    f"{step_ns(whole):.1f}",
+                    f"{step_ns(slotted):.1f}",
+                    f"{step_ns(slotted) / step_ns(whole):.2f}",
+                ]
+            )
+    return table(["case", "bonds missing %", "ns/point-step", "with the slot", "ratio"], rows)
+
+
 def measure(quick: bool) -> tuple[dict[str, object], list[tuple[str, str]]]:
     """All measurements, and the tables that show them."""
     limits = machine()
@@ -323,6 +358,7 @@ def measure(quick: bool) -> tuple[dict[str, object], list[tuple[str, str]]]:
         ("Cost against m, 51 x 101", table_of_m(data, few, turns)),
         ("Cost against n, m = 4", table_of_n(data, few)),
         (ALIGNMENT, table_of_alignment(data, few)),
+        (SLOT, table_of_slots(data, few, 2 * turns)),
     ]
     return data, tables
 
@@ -331,11 +367,15 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--quick", action="store_true", help="fewer steps, not the largest body")
     parser.add_argument("--publish", action="store_true", help="put the tables into the document")
-    parser.add_argument("--alignment", action="store_true", help="only the last table")
+    parser.add_argument("--alignment", action="store_true", help="only the table of aligned arrays")
+    parser.add_argument("--slot", action="store_true", help="only the table of slots")
     arguments = parser.parse_args()
     RESULTS.mkdir(parents=True, exist_ok=True)
     if arguments.alignment:
         print(f"**{ALIGNMENT}**\n\n{table_of_alignment({}, 4 if arguments.quick else 1)}")
+        return 0
+    if arguments.slot:
+        print(f"**{SLOT}**\n\n{table_of_slots({}, 4 if arguments.quick else 1, 15)}")
         return 0
     data, tables = measure(arguments.quick)
     (ROOT / "results" / "bench.json").write_text(json.dumps(data, indent=1) + "\n")

@@ -41,10 +41,15 @@ BODY = """\
   yield_stress = 0.15e6, kinematic_modulus = -1.5e6, residual_strength = 15.0e3 /
 &output frame_count = 2, history_count = 8 /
 """
-L_SHAPE = BODY.replace(
+ACROSS_AIR = BODY.replace("horizon", "families = 'distance', horizon")
+L_SHAPE = ACROSS_AIR.replace(
     "&material",
     "&body x_min = 0.5, x_max = 0.8, y_min = 0.0, y_max = 0.4 /\n&material",
 )
+CUT = """\
+&cut x = 0.25, 0.25, y = 0.65, 1.0 /
+&stabilisation method = 'relaxing', relaxing_strain = 1.0e-2 /
+"""
 PLATENS = """\
 &boundary name = 'bottom', side = 'bottom' /
 &boundary name = 'top', side = 'top', contact = 'smooth', velocity = 0.0, -0.01 /
@@ -138,9 +143,13 @@ CASES = {
     "conical": BODY.replace("horizon =", "influence = 'conical', horizon =") + PLATENS + PATCH,
     "cloud": CLOUD + PLATENS + PATCH + CONTROL,
     "sideways": BODY + SIDEWAYS + PATCH,
-    "materials": BODY.replace("&material", "&material name = 'soil',") + LAYERS + TABLES + CONTROL,
+    "materials": ACROSS_AIR.replace("&material", "&material name = 'soil',")
+    + LAYERS
+    + TABLES
+    + CONTROL,
+    "sight": L_SHAPE.replace("'distance'", "'line_of_sight'") + CUT + TABLES,
 }
-RESTARTED = ("field", "loaded", "cloud", "materials", "polygon")
+RESTARTED = ("field", "loaded", "cloud", "materials", "polygon", "sight")
 
 
 def cloud():

@@ -10,7 +10,7 @@ module samples
   use pd_forces, only: internal_forces
   use pd_geometry, only: body_t, lattice_body, lattice_t, layer_t
   use pd_green_lagrange, only: green_lagrange_t
-  use pd_kinds, only: wp
+  use pd_kinds, only: n_block, wp
   use pd_law, only: law_points_t, law_t
   use pd_materials, only: divide_into_runs, material_t, materials_t
   use pd_measure, only: measure_t
@@ -24,7 +24,7 @@ module samples
 
   public :: random_t, rectangle, sides, jittered_cloud, connect, model_of
   public :: new_material, materials_of, material_of, stress_at_point
-  public :: gradient_of, divergence_of, control_of, internal_force
+  public :: gradient_of, divergence_of, control_of, differences_of, internal_force
   public :: linear_map, rotation
 
   !> Pseudo-random numbers that are the same in every run (Lehmer's generator).
@@ -311,6 +311,26 @@ contains
     end associate
     f = sums
   end subroutine divergence_of
+
+  !> S[x] of all rows.
+  subroutine differences_of(operators, x, s)
+    class(operators_t), intent(in) :: operators
+    real(wp), intent(in)  :: x(:, :)
+    real(wp), intent(out) :: s(:, :)
+    real(wp), allocatable :: field(:, :)
+    real(wp) :: sums(n_block, 2)
+    integer  :: block, lo, hi
+
+    field = x
+    if (operators%weighs) field = spread(operators%share_of, 2, 2) * x
+    s = 0.0_wp
+    do block = 1, operators%domain%blocks%count
+      lo = operators%domain%blocks%lo(block)
+      hi = operators%domain%blocks%hi(block)
+      call operators%difference_sums_block(lo, hi, field, sums)
+      s(lo:hi, :) = sums(:hi - lo + 1, :)
+    end do
+  end subroutine differences_of
 
   !> f <- f + Z[u] of all rows.
   subroutine control_of(operators, u, f)
