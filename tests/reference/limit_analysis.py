@@ -6,10 +6,10 @@ perigeo: `python -m pip install scipy clarabel`. `bounds.py` uses it.
 Lower bound: stresses linear in each triangle, in equilibrium there, with tractions continuous
 across sides and sqrt((sxx - syy)^2 / 4 + sxy^2) <= c at the corners, and so everywhere, since c is
 linear. Upper bound: velocities linear in each triangle, without change of volume, which may slip
-past each other along sides at the cost c |jump|. After Sloan, S.W. (1988) Int. J. Numer. Anal.
+past each other along sides at the cost c |jump|. After Sloan, S.W. (1988) Int. J. Num. Anal.
 Methods Geomech. 12, 61-77; Sloan, S.W. & Kleeman, P.W. (1995) Comput. Methods Appl. Mech. Engrg
-127, 293-314; as cone programs: Makrodimopoulos, A. & Martin, C.M. (2006) Int. J. Numer. Methods
-Engrg 66, 604-634. Tension is positive here, y points up.
+127, 293-314; as cone programs: Makrodimopoulos, A. & Martin, C.M. (2006) Int. J. Num. Methods
+Engng 66, 604-634. Tension is positive here, y points up.
 """
 
 from __future__ import annotations
