@@ -130,6 +130,11 @@ verify:            ## compare computed values with closed forms, printed as a ta
 	@$(submake) $(parallel) program
 	@$(venv)/bin/python tests/verify/verify.py $(if $(PUBLISH),--publish)
 
+limit_loads:       ## limit loads against exact solutions, on several grids; PUBLISH=1: into doc/
+	@sh tools/setup.sh test
+	@$(submake) $(parallel) program
+	@$(venv)/bin/python tests/verify/limits.py $(if $(PUBLISH),--publish)
+
 clouds:            ## points off a lattice: stress, compression, cost; PUBLISH=1: doc/model.md
 	@sh tools/setup.sh test
 	@$(submake) $(parallel) program
