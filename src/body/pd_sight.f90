@@ -85,16 +85,19 @@ contains
   pure logical function all_clear(self, i)
     class(sight_t), intent(in) :: self
     integer,        intent(in) :: i
-    integer :: k
+    real(wp) :: x(2), far   ! gfortran 12 passes an associated section of an array unpacked
+    integer  :: k
 
+    x = self%position(i, :)
+    far = 1.001_wp * self%delta
     all_clear = .true.
     if (allocated(self%place)) &
       all_clear = self%empty_squares(self%place(i, :) - self%reach, &
       self%place(i, :) + self%reach) == 0
     do k = 1, size(self%cuts, 2)
-      associate (cut => self%cuts(:, k), x => self%position(i, :), far => 1.001_wp * self%delta)
+      associate (cut => self%cuts(:, k))
         all_clear = all_clear .and. (any(x < min(cut(1:2), cut(3:4)) - far) &
-          .or. any(x > max(cut(1:2), cut(3:4)) + far))
+          .or. any(x > max(cut(1:2), cut(3:4)) + far) .or. abs(left_of(cut, x)) > far)
       end associate
     end do
   end function all_clear
@@ -170,20 +173,29 @@ contains
     halves = (i - modulo(i, 2)) / 2
   end function halves
 
+  !> Distance of a place to the left of the line through a cut, seen from its first end.
+  pure real(wp) function left_of(cut, x)
+    real(wp), intent(in) :: cut(4), x(2)   !! [m]
+
+    left_of = ((cut(3) - cut(1)) * (x(2) - cut(2)) - (cut(4) - cut(2)) * (x(1) - cut(1))) &
+      / norm2(cut(3:4) - cut(1:2))
+  end function left_of
+
   !> Whether the bond between two points crosses cut k. What is nearer than 1e-6 horizons to the cut
   !> is on it, so that round-off decides about no bond.
   pure logical function crosses(self, k, i, j)
     class(sight_t), intent(in) :: self
     integer,        intent(in) :: k, i, j
-    real(wp) :: along(2), length, from, to, at(2), part, margin
+    real(wp) :: along(2), length, from, to, at(2), part, margin, x(2), y(2)
 
+    x = self%position(min(i, j), :)
+    y = self%position(max(i, j), :)
     margin = 1.0e-6_wp * self%delta
-    associate (a => self%cuts(1:2, k), b => self%cuts(3:4, k), &
-      x => self%position(min(i, j), :), y => self%position(max(i, j), :))
+    associate (a => self%cuts(1:2, k), b => self%cuts(3:4, k))
       length = norm2(b - a)
       along = (b - a) / length
-      from = along(1) * (x(2) - a(2)) - along(2) * (x(1) - a(1))   ! to the left of the cut
-      to = along(1) * (y(2) - a(2)) - along(2) * (y(1) - a(1))
+      from = left_of(self%cuts(:, k), x)
+      to = left_of(self%cuts(:, k), y)
       crosses = (from >= -margin) .neqv. (to >= -margin)
       if (.not. crosses) return
       part = min(1.0_wp, max(0.0_wp, from / (from - to)))
