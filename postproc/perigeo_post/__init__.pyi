@@ -41,6 +41,7 @@ from .measure.measures import largest_plastic_strain as largest_plastic_strain
 from .measure.measures import measure_band as measure_band
 from .measure.measures import run_facts as run_facts
 from .measure.sampling import interpolate as interpolate
+from .measure.smooth import smoothed as smoothed
 from .read.errors import FieldNotFoundError as FieldNotFoundError
 from .read.errors import FrameNotFoundError as FrameNotFoundError
 from .read.errors import NoBandError as NoBandError

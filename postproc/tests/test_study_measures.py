@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from perigeo_post import Run
-from perigeo_post.measure.noise import alternating
+from perigeo_post.measure.noise import alternating, flow_threshold
 from perigeo_post.study.measures import MEASURES, line_meeting
 from perigeo_post.study.types import Missing, State, Value
 
@@ -121,6 +121,20 @@ def test_noise_is_the_amplitude_of_what_alternates_and_tells_flow_from_the_rest(
     assert along_y[2:-2] == pytest.approx(0.0, abs=1e-9)
     assert np.isnan(along_x[:, :2]).all()
     assert np.isnan(along_y[-2:]).all()
+
+
+@pytest.mark.parametrize(
+    ("strength", "threshold"), [("0.15e6", 1e-6), ("500.0", 1e-8), (None, 1e-6)]
+)
+def test_soft_soil_has_flowed_at_smaller_strains(
+    result: Path, strength: str | None, threshold: float
+) -> None:
+    with h5py.File(result, "r+") as file:
+        del file["input/values"]
+        values = ["material.youngs_modulus=50.0e6"]
+        values += [f"material.yield_stress={strength}"] if strength else []
+        file["input/values"] = values
+    assert flow_threshold(Run(result)) == pytest.approx(threshold)
 
 
 def test_noise_outside_and_inside_of_the_flow(result: Path) -> None:

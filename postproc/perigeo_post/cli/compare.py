@@ -65,7 +65,7 @@ def carry_out(args: Arguments) -> None:
 
         return figures.compare_figure(
             runs, args.field, args.strain, args.time, names, args.deformed,
-            args.tension_positive, args.min, args.max,
+            args.tension_positive, args.min, args.max, args.smooth,
         )  # fmt: skip
 
     draw_figure(args, args.files[0], "compare", draw)

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..measure import export, measures
+from ..measure.smooth import are_smoothed, smoothed_for
 from ..read.run import Frame, Run
 from .options import (
     Arguments,
@@ -68,6 +69,13 @@ def chosen_frames(
     return [later[k] for k in picked]
 
 
+def shown_frames(args: Arguments, frames: list[Frame]) -> list[Frame]:
+    """The frames, with smoothed displacements where that is asked for."""
+    if not args.smooth:
+        return frames
+    return [smoothed_for(frame, args.field, args.deformed) for frame in frames]
+
+
 def carry_out(args: Arguments) -> None:
     runs = [Run(path) for path in args.files]
     names = measures.labels_for(runs, args.labels)
@@ -77,7 +85,7 @@ def carry_out(args: Arguments) -> None:
         found = chosen_frames(
             run, args.strain, args.time, args.frame, args.tolerance, args.include_invalid
         )
-        frames += found
+        frames += shown_frames(args, found)
         titles += [f.label if len(runs) == 1 else f"{name}\n{f.label}" for f in found]
     if args.csv:
         say(args, export.write_points(args.csv, frames, args.field))
@@ -102,6 +110,7 @@ def frame_numbers(frame: Frame, name: str, fictitious: bool = False) -> dict[str
     numbers: dict[str, Any] = {
         "run": frame.run.name, "frame": frame.number, "step": frame.step, "time": frame.time,
         "strain": frame.strain, "valid": frame.valid, "field": name, "unit": field.unit,
+        "smoothed": are_smoothed([frame]),
         "min": None, "max": None, "mean": None, "position_of_max": None,
     }  # fmt: skip
     good = np.isfinite(values)
@@ -131,7 +140,7 @@ def carry_out_animate(args: Arguments) -> None:
     from ..draw.animation import animate
 
     run = Run(args.file)
-    frames = run.frames(args.include_invalid)
+    frames = shown_frames(args, run.frames(args.include_invalid))
     if args.json:
         print(export.to_json([frame_numbers(f, args.field, args.fictitious) for f in frames]))
         if args.output is None:

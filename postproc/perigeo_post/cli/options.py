@@ -81,6 +81,10 @@ def add_colours(parser: argparse.ArgumentParser) -> None:
         "--deformed", metavar="SCALE", type=float, nargs="?", const=1.0,
         help="deformed shape, displacements times SCALE (default 1)",
     )  # fmt: skip
+    parser.add_argument(
+        "--smooth", action="store_true",
+        help="displacements without zero-energy modes: affine fits over the families",
+    )  # fmt: skip
     parser.add_argument("--min", metavar="V", type=float, help="low end of the colours, SI units")
     parser.add_argument("--max", metavar="V", type=float, help="high end of the colours, SI units")
 

@@ -51,7 +51,7 @@ def animate(
     scale = common_scale([p.values for p in panels], unit, low, high)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        pictures = _pictures(panels, scale, field, deformation_note(deformed), dpi)
+        pictures = _pictures(panels, scale, field, deformation_note(deformed, frames), dpi)
         if path.suffix.lower() == ".gif":
             _write_gif(path, pictures, fps)
         else:

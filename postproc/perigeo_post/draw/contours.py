@@ -13,6 +13,7 @@ from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
+from ..measure.smooth import WORDS, are_smoothed
 from ..read.errors import RequestError
 from ..read.fields import label_of
 from ..read.points import FloatArray, Lattice, find_lattice
@@ -249,9 +250,13 @@ def grid_for(count: int, aspect: float, width: float) -> tuple[int, int, float]:
     return best
 
 
-def deformation_note(deformed: float | None) -> str | None:
-    """The words that state the scale of the deformed shape."""
-    return None if deformed is None else f"Deformed shape, displacements × {deformed:g}"
+def deformation_note(deformed: float | None, frames: Sequence[Frame] = ()) -> str | None:
+    """The words that state the scale of the deformed shape, and that displacements are smoothed."""
+    smooth = are_smoothed(frames)
+    if deformed is None:
+        return f"Displacements {WORDS}" if smooth else None
+    note = f"Deformed shape, displacements × {deformed:g}"
+    return f"{note}, {WORDS}" if smooth else note
 
 
 def contour_figure(
@@ -281,7 +286,7 @@ def contour_figure(
     aspect = float((y1 - y0) / (x1 - x0))
     width = _column_width(column, len(panels))
     columns, rows, size = grid_for(len(panels), aspect, width)
-    note = deformation_note(deformed)
+    note = deformation_note(deformed, frames)
     height = rows * (size * aspect + 10.0) + (18.0 if note else 12.0)
     used = min(width, max(columns * (size + 3.0) + 34.0, 60.0))
     with style():

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from ..measure.band import BandMeasure
 from ..measure.curves import Curve, energy_curves, history_curve, peak, stress_strain
 from ..measure.measures import labels_for, measure_band
+from ..measure.smooth import smoothed_for
 from ..read.errors import RequestError
 from ..read.fields import label_of
 from ..read.run import Frame, Run
@@ -246,10 +247,13 @@ def compare_figure(
     tension_positive: bool = False,
     low: float | None = None,
     high: float | None = None,
+    smooth: bool = False,
 ) -> Figure:
     """Contours of several runs side by side on one scale, and their stress-strain curves."""
     names = labels_for(runs, labels)
     frames: list[Frame] = [run.frame(strain, time) for run in runs]
+    if smooth:
+        frames = [smoothed_for(frame, field, deformed) for frame in frames]
     titles = [f"{n}\n{f.label}" for n, f in zip(names, frames)]
     panels = [panel_of(f, field, deformed, False, t) for f, t in zip(frames, titles)]
     scale = common_scale([p.values for p in panels], frames[0].scalar(field).unit, low, high)
@@ -275,7 +279,7 @@ def compare_figure(
             ax.set_visible(False)
         drawn = fill_axes(panels, axes, scale, columns)
         add_colour_bar(parts[0], drawn, axes[: len(panels)], field, scale)
-        note = deformation_note(deformed)
+        note = deformation_note(deformed, frames)
         if note:
             parts[0].suptitle(note)
         if curves:

@@ -16,9 +16,10 @@ import numpy as np
 
 from ..read.errors import RequestError
 from ..read.points import BoolArray, FloatArray
-from ..read.run import Frame
+from ..read.run import Frame, Run
 
-FLOWS = 1.0e-6  # equivalent plastic strain from which on a point has flowed
+FLOWS = 1.0e-6  # equivalent plastic strain from which on a point has flowed,
+FLOWS_OF_YIELD = 1.0e-3  # or this part of the strain at yield, where that is less
 
 
 @dataclass(frozen=True)
@@ -39,7 +40,7 @@ def noise_of(frame: Frame) -> Noise:
     if lattice is None:
         raise RequestError(f"{run.path} is no lattice, along which differences could be taken")
     body = run.body
-    flowed = np.nan_to_num(lattice.grid(frame["plastic_strain"][body])) > FLOWS
+    flowed = np.nan_to_num(lattice.grid(frame["plastic_strain"][body])) > flow_threshold(run)
     far = ~_spread(flowed, int(run.horizon / lattice.spacing * (1.0 + 1e-6)))
     found = alternating(lattice.grid(frame["displacement"][body])) / lattice.spacing
     zero = lattice.grid(frame["zero_energy"][body])
@@ -51,6 +52,14 @@ def noise_of(frame: Frame) -> Noise:
         float(zero[far & there].max()) if (far & there).any() else float("nan"),
         _rms(zero[flowed]),
     )
+
+
+def flow_threshold(run: Run) -> float:
+    """Plastic strain above which a point counts as flowed; soft soils yield at small strains."""
+    strength, modulus = run.number("material.yield_stress"), run.number("material.youngs_modulus")
+    if not strength or not modulus:
+        return FLOWS
+    return min(FLOWS, FLOWS_OF_YIELD * strength / modulus)
 
 
 def alternating(u: FloatArray) -> FloatArray:

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 
 from ..draw.contours import Panel, Scale, common_extent, common_scale, draw_panel, panel_of
 from ..draw.style import COLOURS, new_figure, style, with_unit
+from ..measure.smooth import WORDS, smoothed_for
 from ..read.errors import PostError, RequestError
 from ..read.fields import label_of
 from ..read.points import FloatArray
@@ -24,7 +25,7 @@ from .types import Column, Drawing, State, StudyRun
 
 CONTOUR_OPTIONS = COMMON | {
     "by", "field", "strain", "rows", "same_scale", "low", "high", "deformed", "per_row",
-    "show_line", "panel_height",
+    "show_line", "smooth", "panel_height",
 }  # fmt: skip
 
 LONGEST_BAR = 70.0  # [mm]
@@ -110,6 +111,8 @@ def _cell(
     deformed = draw.number(options, "deformed")
     try:
         frame = run.run.frame(wanted)
+        if draw.flag(options, "smooth"):
+            frame = smoothed_for(frame, field, deformed)
         panel = panel_of(frame, field, deformed, title=title)
     except PostError as error:
         return _Cell(run, title, None, None, str(error))
@@ -143,7 +146,9 @@ def _contour_figure(
         _box(layout, layout.right + 3.0, 0.5 * (top + low + tall), 2.8, tall)
     )
     bar: Any = figure.colorbar(drawn, cax=bar_axes, extend=scale.extend)
-    bar.set_label(with_unit(label_of(field), scale.unit))
+    name = with_unit(label_of(field), scale.unit)
+    smooth = draw.flag(options, "smooth")
+    bar.set_label(f"{name}; displacements {WORDS}" if smooth else name)
     bar.outline.set_linewidth(0.5)
     return figure
 

@@ -274,6 +274,7 @@ class FigureOptions(_Table):
     show_line: Switch = None
     slope: Target = None
     slope_label: Word = None
+    smooth: Switch = None
     strain: Numbers = None
     target: Target = None
     target_label: Word = None
