@@ -182,6 +182,7 @@ class Case:
     """One comparison: inputs of perigeo, its spacings and horizons, curves of CalculiX."""
 
     title: str
+    short: str  # title of its panel
     groups: Callable[[Points], Groups]
     points: tuple[Points, ...]  # coarse to fine
     meshes: dict[str, str]  # curve -> label, the finest mesh of 8-node elements first
@@ -190,6 +191,7 @@ class Case:
 COMPARED = {
     "compression": Case(
         "compression, perfectly plastic, small strain",
+        "compression, small strain",
         compression,
         ((0.04, 0.12), (0.02, 0.06)),
         {
@@ -200,18 +202,21 @@ COMPARED = {
     ),
     "finite": Case(
         "compression to 4 %, isotropic hardening, logarithmic strain",
+        "compression to 4 %, hardening",
         finite,
         ((0.04, 0.12), (0.02, 0.06)),
         {"finite_cpe8r_100": "8 nodes, h = 0.1 m", "finite_cpe8r_200": "8 nodes, h = 0.2 m"},
     ),
     "cyclic": Case(
         "cyclic, kinematic hardening, logarithmic strain",
+        "cyclic, kinematic hardening",
         cyclic,
         ((0.04, 0.12), (0.02, 0.06)),
         {"cyclic_cpe8r_100": "8 nodes, h = 0.1 m", "cyclic_cpe8r_200": "8 nodes, h = 0.2 m"},
     ),
     "footing": Case(
         "rough strip footing, perfectly plastic, small strain",
+        "rough strip footing",
         footing,
         ((0.1, 0.3), (0.05, 0.15), (0.025, 0.075)),
         {
@@ -351,7 +356,7 @@ def nonlocal_curves(runs: dict[str, Curve]) -> list[Curve]:
 
 def figures(found: dict[str, list[Compared]], runs: dict[str, Curve]) -> None:
     panels = [
-        Panel(COMPARED[name].title, lines[0].curve, lines[-1].curve)
+        Panel(COMPARED[name].short, lines[0].curve, lines[-1].curve)
         for name, lines in found.items()
     ]
     draw_comparison(panels, RESULTS / FIGURES[0])

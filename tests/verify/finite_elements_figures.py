@@ -54,8 +54,9 @@ def draw_comparison(panels: list[Panel], path: Path) -> None:
             axes.set_title(f"({letter}) {panel.title}", loc="left")
             axes.set_xlabel("displacement [mm]")
             axes.set_ylabel("load [kN/m]")
-            low, high = axes.get_ylim()
-            axes.set_ylim(low - 0.22 * (high - low), high)  # room for the legend
+            low, high = float(np.min(reference.load)), float(np.max(reference.load))
+            room = 0.35 * (high - low) if low < 0.0 else 0.0  # for the legend
+            axes.set_ylim(1.05e-3 * low - 1e-3 * room, 1.08e-3 * high)
             axes.legend(loc="lower right")
         figure.savefig(path, dpi=160)
 
@@ -63,7 +64,7 @@ def draw_comparison(panels: list[Panel], path: Path) -> None:
 def draw_softening(families: list[Family], nonlocal_family: Family, path: Path) -> None:
     """Curves of finite elements, curves of perigeo, work against size."""
     with style():
-        figure = new_figure(DOUBLE, 78.0)
+        figure = new_figure(DOUBLE, 84.0)
         left, middle, right = figure.subplots(1, 3, width_ratios=(1.0, 1.0, 0.9))
         for axes, shown in ((left, families), (middle, [nonlocal_family])):
             for family in shown:
@@ -78,11 +79,11 @@ def draw_softening(families: list[Family], nonlocal_family: Family, path: Path) 
                     )
             axes.set_xlabel("displacement [mm]")
             axes.set_ylabel("load [kN/m]")
-            axes.set_ylim(0.0, 185.0)
             axes.set_xlim(0.0, 24.0)
-        left.set_title("(a) finite elements, " + families[0].label, loc="left")
+        left.set_title("(a) finite elements, lines as in (c)", loc="left")
         middle.set_title("(b) perigeo, horizon 0.08 m", loc="left")
         for axes in (left, middle):
+            axes.set_ylim(0.0, 235.0)  # room for the legend
             axes.legend(loc="upper right")
         for family in (*families, nonlocal_family):
             work = [curve.work / 1e3 for curve in family.curves]
@@ -98,9 +99,9 @@ def draw_softening(families: list[Family], nonlocal_family: Family, path: Path) 
         right.set_xscale("log", base=2)
         right.set_xticks(sizes, [f"{size:.3g}" for size in sizes], rotation=60)
         right.minorticks_off()
-        right.set_ylim(0.0, 1.3 * np.max(right.get_ylim()))
-        right.set_xlabel("size of elements, spacing of points [m]")
+        right.set_ylim(0.0, 1.45 * np.max(right.get_ylim()))
+        right.set_xlabel("size of elements or spacing [m]")
         right.set_ylabel("work to 1.2 % [kJ/m]")
-        right.set_title("(c) work", loc="left")
+        right.set_title("(c) work, all of them", loc="left")
         right.legend(loc="upper left")
         figure.savefig(path, dpi=160)

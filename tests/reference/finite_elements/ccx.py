@@ -111,7 +111,7 @@ class Model:
     finite: bool = False  # large deformation
     weak: tuple[float, float, float] | None = None  # centre x, y and radius of a weak patch
     weak_factor: float = 1.0
-    dynamic: bool = False  # inertia, where statics finds no way
+    dynamic: bool = False  # inertia, where no equilibrium is found
     density: float = 2000.0
 
 
