@@ -53,7 +53,7 @@ studies := fig3a fig3b fig4 fig5 seeds horizon loading size softening influence 
   zero_energy equilibrium
 .PHONY: all program objects post debug units demo demo-quick test lint verify \
   layers setup install help clean distclean figures $(studies) \
-  report report-view site bench clouds
+  report report-view site bench clouds finite_elements
 .DEFAULT_GOAL := all
 
 help_width := 13
@@ -140,6 +140,11 @@ clouds:            ## points off a lattice: stress, compression, cost; PUBLISH=1
 	@$(submake) $(parallel) program
 	@$(venv)/bin/python tests/verify/clouds.py $(if $(PUBLISH),--publish)
 
+finite_elements:   ## perigeo beside finite elements (CalculiX, kept curves); PUBLISH=1: into doc/
+	@sh tools/setup.sh test
+	@$(submake) $(parallel) program
+	@$(venv)/bin/python tests/verify/finite_elements.py $(if $(PUBLISH),--publish)
+
 bench:             ## measure the speed on this machine; PUBLISH=1: into doc/performance.md
 	@sh tools/setup.sh test
 	@$(submake) $(parallel) program build/opt/bench/machine
@@ -158,7 +163,7 @@ distclean: clean   ## remove .venv and results too
 
 help:              ## list the targets
 	@echo 'Targets:'
-	@awk -F ':.*## ' '/^[a-z0-9_-]+:.*## / { printf "  make %-13s %s\n", $$1, $$2 }' Makefile
+	@awk -F ':.*## ' '/^[a-z0-9_-]+:.*## / { printf "  make %-15s %s\n", $$1, $$2 }' Makefile
 	@echo 'Settings:'
 	@echo '  MARCH=x86-64-v3   processor to compile for (native; empty: any)'
 	@echo '  FFLAGS=-O2        optimisation flags (-O3)'
@@ -172,7 +177,7 @@ help:              ## list the targets
 # ---------------------------------------------------------------------------------- compiling
 # The rest needs the compiler and HDF5, which `make demo` may have to install first.
 ifneq ($(filter-out setup demo demo-quick test debug lint verify layers help clean \
-  distclean figures $(studies) report report-view site bench clouds,\
+  distclean figures $(studies) report report-view site bench clouds finite_elements,\
   $(or $(MAKECMDGOALS),all)),)
 
 ifeq ($(shell command -v $(firstword $(FC)) 2>/dev/null),)
