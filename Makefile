@@ -53,7 +53,7 @@ studies := fig3a fig3b fig4 fig5 seeds horizon loading size softening influence 
   zero_energy equilibrium
 .PHONY: all program objects post debug units demo demo-quick test lint verify \
   layers setup install help clean distclean figures $(studies) \
-  report report-view site bench clouds finite_elements
+  report report-view site bench clouds finite_elements limit_loads
 .DEFAULT_GOAL := all
 
 help_width := 13
@@ -177,7 +177,7 @@ help:              ## list the targets
 # ---------------------------------------------------------------------------------- compiling
 # The rest needs the compiler and HDF5, which `make demo` may have to install first.
 ifneq ($(filter-out setup demo demo-quick test debug lint verify layers help clean \
-  distclean figures $(studies) report report-view site bench clouds finite_elements,\
+  distclean figures $(studies) report report-view site bench clouds finite_elements limit_loads,\
   $(or $(MAKECMDGOALS),all)),)
 
 ifeq ($(shell command -v $(firstword $(FC)) 2>/dev/null),)

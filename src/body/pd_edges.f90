@@ -9,7 +9,7 @@ module pd_edges
   implicit none
   private
 
-  public :: edge_t, outline_edges, rim_edges, bare_edges
+  public :: edge_t, material_t, outline_edges, rim_edges, bare_edges
 
   type :: edge_t
     real(wp) :: start(2) = 0.0_wp, finish(2) = 0.0_wp   !! [m]
@@ -21,12 +21,19 @@ module pd_edges
     procedure :: direction
   end type edge_t
 
+  !> Where there is material, without layers.
+  type, abstract :: material_t
+  contains
+    procedure(holds), deferred :: holds
+  end type material_t
+
   abstract interface
-    !> Whether x [m] is in the material of the body, without layers.
-    logical function material_at(x)
-      import :: wp
-      real(wp), intent(in) :: x(2)
-    end function material_at
+    !> Whether x [m] is in the material of the body.
+    pure logical function holds(self, x)
+      import :: material_t, wp
+      class(material_t), intent(in) :: self
+      real(wp),          intent(in) :: x(2)
+    end function holds
   end interface
 
 contains
@@ -147,11 +154,11 @@ contains
     end do
   end subroutine find_quarters
 
-  !> What of the edges of shapes is surface: not what lies in material of another shape or under a
-  !> layer. The outer edges of the layers follow. Edges are numbered as they are given.
-  subroutine bare_edges(given, in_material, body, spacing, edges)
+  !> What of the edges of shapes is surface: not what lies in material of another shape, outside of
+  !> any or under a layer. The outer edges of the layers follow. Edges are numbered as they are given.
+  subroutine bare_edges(given, material, body, spacing, edges)
     type(edge_t), intent(in) :: given(:)      !! of all shapes
-    procedure(material_at)   :: in_material
+    class(material_t), intent(in) :: material
     type(body_t), intent(in) :: body
     real(wp),     intent(in) :: spacing       !! dx [m]
     type(edge_t), allocatable, intent(out) :: edges(:)
@@ -218,10 +225,11 @@ contains
       if (of_layer) then
         place = place_of(x - 0.1_wp * out)
         kept = any(owner(place(1) - 1:place(1) + 1, place(2) - 1:place(2) + 1) > 0)
-        if (kept) kept = .not. in_material(x - 0.1_wp * out)
+        if (kept) kept = .not. material%holds(x - 0.1_wp * out)
       else
         kept = .not. (is_layer(x + 0.6_wp * out) .or. is_layer(x + 1.2_wp * out))
-        if (kept) kept = .not. in_material(x + 0.1_wp * out)
+        if (kept) kept = material%holds(x - 0.1_wp * out) .and. &
+          .not. material%holds(x + 0.1_wp * out)
       end if
     end function kept
 

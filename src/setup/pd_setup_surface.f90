@@ -3,7 +3,7 @@
 !> Source: doc/theory.md, section 7.
 module pd_setup_surface
   use pd_edge_weights, only: find_edge_weights
-  use pd_edges, only: bare_edges, edge_t, outline_edges, rim_edges
+  use pd_edges, only: bare_edges, edge_t, material_t, outline_edges, rim_edges
   use pd_input_shapes, only: outline
   use pd_input_types, only: boundary_input_t, input_t
   use pd_kinds, only: wp
@@ -16,6 +16,18 @@ module pd_setup_surface
   private
 
   public :: find_surface, edges_of, taken
+
+  type :: polygon_t
+    real(wp), allocatable :: vertices(:, :)   !! (2,n) [m]
+    logical :: solid = .true.                 !! else a hole
+  end type polygon_t
+
+  !> The bodies of a stage; the last one that holds a place decides.
+  type, extends(material_t) :: bodies_t
+    type(polygon_t), allocatable :: list(:)
+  contains
+    procedure :: holds
+  end type bodies_t
 
 contains
 
@@ -62,32 +74,32 @@ contains
     type(model_t), intent(in) :: model
     type(edge_t), allocatable, intent(out) :: edges(:)
     type(edge_t), allocatable :: given(:)
+    type(bodies_t) :: bodies
     integer :: k
 
-    allocate (given(0))
+    allocate (given(0), bodies%list(0))
     do k = 1, size(input%bodies)
+      if (stage%has_body(k)) bodies%list = [bodies%list, &
+        polygon_t(outline(input%bodies(k), model%spacing), input%bodies(k)%role /= 'hole')]
       given = [given, rim_edges(outline(input%bodies(k), model%spacing), &
         input%bodies(k)%role == 'hole')]
     end do
-    call bare_edges(given, in_material, model%body, model%spacing, edges)
-
-  contains
-
-    !> Whether the last body of this stage that holds x is solid.
-    logical function in_material(x)
-      real(wp), intent(in) :: x(2)
-      integer :: b
-
-      in_material = .false.
-      do b = size(input%bodies), 1, -1
-        if (.not. stage%has_body(b)) cycle
-        if (.not. inside(outline(input%bodies(b), model%spacing), x)) cycle
-        in_material = input%bodies(b)%role /= 'hole'
-        return
-      end do
-    end function in_material
-
+    call bare_edges(given, bodies, model%body, model%spacing, edges)
   end subroutine find_bare_edges
+
+  !> Whether the last body that holds x is solid.
+  pure logical function holds(self, x)
+    class(bodies_t), intent(in) :: self
+    real(wp),        intent(in) :: x(2)   !! [m]
+    integer :: k
+
+    holds = .false.
+    do k = size(self%list), 1, -1
+      if (.not. inside(self%list(k)%vertices, x)) cycle
+      holds = self%list(k)%solid
+      return
+    end do
+  end function holds
 
   !> Which edges of a surface are those of a body, or one of them.
   pure function edges_of(input, spacing, body, edge, numbers) result(chosen)
