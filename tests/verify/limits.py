@@ -221,9 +221,9 @@ CASES: dict[str, Case] = {
         "Rough strip footing",
         "kN/m",
         (
-            Variant("default control", "strip_footing", settled("footing", -1.0), PRANDTL,
+            Variant("default control", "strip_footing", settled("footing"), PRANDTL,
                     PRANDTL, 1.5e-2, (*EQUILIBRIUM, "stabilisation.method=relaxing")),
-            Variant("no control", "strip_footing", settled("footing", -1.0), PRANDTL, PRANDTL,
+            Variant("no control", "strip_footing", settled("footing"), PRANDTL, PRANDTL,
                     1.0e-2, EQUILIBRIUM),
         ),
         FOOTING, prandtl, "Prandtl", AROUND,
@@ -231,16 +231,16 @@ CASES: dict[str, Case] = {
     "smooth_footing": Case(
         "Smooth strip footing",
         "kN/m",
-        (Variant("", "smooth_footing", settled("footing", -1.0), PRANDTL, PRANDTL, 1.5e-2),),
+        (Variant("", "smooth_footing", settled("footing"), PRANDTL, PRANDTL, 1.5e-2),),
         FOOTING, hill, "Hill", AROUND,
     ),
     "growing_strength": Case(
         "Strip footing, strength grows with depth, k B / c0 = 4",
         "kN/m",
         (
-            Variant("rough", "growing_strength_rough", settled("footing", -1.0), ROUGH, ROUGH,
+            Variant("rough", "growing_strength_rough", settled("footing"), ROUGH, ROUGH,
                     3.0e-2),
-            Variant("smooth", "growing_strength_smooth", settled("footing", -1.0), SMOOTH, SMOOTH,
+            Variant("smooth", "growing_strength_smooth", settled("footing"), SMOOTH, SMOOTH,
                     3.0e-2),
         ),
         FOOTING, box=AROUND,
@@ -270,7 +270,7 @@ CASES: dict[str, Case] = {
         "Smooth wall, gamma h^2 / 2 -+ 2 c h",
         "kN/m",
         (
-            Variant("active", "wall_active", settled("wall"), 5.0, 5.0, 2.0e-2),
+            Variant("active", "wall_active", settled("wall"), 15.0, 15.0, 2.0e-2),
             Variant("passive", "wall_passive", settled("wall"), 45.0, 45.0, 2.0e-2),
         ),
         HEIGHT, wedge_behind_wall, "45 degrees", (-0.3, 2.5, -0.3, 1.1),
