@@ -271,8 +271,8 @@ FINDING = '[[finding]]\ntitle = "F"\nfound = "{a}"\n'
         (HEAD + "[set]\nimperfections = false\n", "line 6, set, imperfections: unknown group, "
          "did you mean 'imperfection'?; found: imperfections"),
         (HEAD + "[set]\nimperfection = 1\n", "set, imperfection: is a group: only false"),
-        (HEAD + "[set]\n'body.x_mim' = 'unset'\n", 'line 6, set, "body.x_mim": there is no such '
-         "key to take out"),
+        (HEAD + "[set]\n'body.x_mim' = 'unset'\n", 'line 6, set, "body.x_mim": the file has no such '
+         "group; found: x_mim; allowed: a name of &body or 1 to 1"),
         (HEAD + "[set]\n'body.x_mim' = 1\n", "set, \"body.x_mim\": unknown key, did you mean"),
         (HEAD + "[parameters]\nrho = [1, -2]\n[set]\n'material.density' = '=rho'\n",
          'line 8, set, "material.density": out of range; found: -2; allowed: > 0'),
@@ -356,10 +356,10 @@ def test_what_is_wrong_does_not_hide_what_else_is_wrong(wrong: Any) -> None:
         "line 5, strain: must be a number",
         "line 6, extra: unknown key",
         "line 9, parameters, run: cannot be the name",
-        'line 11, set, "body.x_mim": there is no such key to take out',
+        'line 11, set, "body.x_mim": the file has no such group',
         'line 12, set, "body.x_min": must be a number, a text or a list of them; found: 2020-01-01',
         "line 14, case 1, label: must be a text; found: 3",
-        'line 15, case 1, set, "body.y_mim": there is no such key to take out',
+        'line 15, case 1, set, "body.y_mim": the file has no such group',
         "line 17, figure 1, name: is no name",
         "line 19, figure 1, x: must be a text; found: 1",
         'line 20, figure 1, y: unknown column; found: "wdith"',

@@ -86,10 +86,11 @@ contains
     integer :: i
 
     associate (state => run%state)
+      allocate (clear%rows(count(model%points%volume <= 0.0_wp)))
       clear%rows = pack([(i, i=1, size(model%points%volume))], model%points%volume <= 0.0_wp)
       call state%visit(clear)
       state%strength = model%strength
-      before = state%force
+      allocate (before, source=state%force)
       call keep_stress(run, model)
       call find_forces(run, model)
       state%released = model%points%free * (state%force - before)
@@ -107,8 +108,8 @@ contains
     real(wp), allocatable :: memory(:, :), strain(:, :)
 
     associate (state => run%state)
-      memory = state%control_memory
-      strain = strain_of(run%model, state%displacement_gradient)
+      allocate (memory, source=state%control_memory)
+      allocate (strain, source=strain_of(run%model, state%displacement_gradient))
       call find_forces(run, model)
       state%initial_strain = state%initial_strain + strain &
         - strain_of(model, state%displacement_gradient)
@@ -143,9 +144,10 @@ contains
     integer :: failed_row
 
     associate (state => run%state)
-      stress = state%stress
-      history = state%history
-      call forces(model, run%clock%time(), state, run%increments%relaxation%blocks, run%timing, failed_row)
+      allocate (stress, source=state%stress)
+      allocate (history, source=state%history)
+      call forces(model, run%clock%time(), state, run%increments%relaxation%blocks, run%timing, &
+        failed_row)
       state%stress = stress
       state%history = history
     end associate

@@ -155,7 +155,8 @@ contains
   end subroutine find_quarters
 
   !> What of the edges of shapes is surface: not what lies in material of another shape, outside of
-  !> any or under a layer. The outer edges of the layers follow. Edges are numbered as they are given.
+  !> any or under a layer. The outer edges of the layers follow. Edges are numbered as they are
+  !> given.
   subroutine bare_edges(given, material, body, spacing, edges)
     type(edge_t), intent(in) :: given(:)      !! of all shapes
     class(material_t), intent(in) :: material

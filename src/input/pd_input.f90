@@ -108,6 +108,7 @@ contains
     call input%run%complete()
     call input%output%complete()
     do k = 1, size(input%bodies)
+      if (input%bodies(k)%role == 'hole') cycle
       if (input%bodies(k)%material == '' .and. size(input%materials) > 0) &
         input%bodies(k)%material = input%materials(1)%name
     end do

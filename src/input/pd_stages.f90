@@ -115,18 +115,18 @@ contains
     character(*),  intent(in)    :: text              !! 'body=material ...'
     type(input_t), intent(in)    :: input
     integer,       intent(inout) :: material_of(:)
-    character(name_length), allocatable :: words(:)
     integer :: i, j, k
 
-    words = stage_names(text)
-    do i = 1, size(words) - 1, 2
-      do k = 1, size(input%bodies)
-        if (input%bodies(k)%name /= words(i)) cycle
-        do j = 1, size(input%materials)
-          if (input%materials(j)%name == words(i + 1)) material_of(k) = j
+    associate (words => stage_names(text))
+      do i = 1, size(words) - 1, 2
+        do k = 1, size(input%bodies)
+          if (input%bodies(k)%name /= words(i)) cycle
+          do j = 1, size(input%materials)
+            if (input%materials(j)%name == words(i + 1)) material_of(k) = j
+          end do
         end do
       end do
-    end do
+    end associate
   end subroutine change_materials
 
   !> The names in a text, separated by blanks, commas or =; without names where it says none.

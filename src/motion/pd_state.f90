@@ -20,7 +20,7 @@ module pd_state
     real(wp), allocatable :: force(:, :)                   !! force density f (n,2) [N/m^3]
     real(wp), allocatable :: displacement_gradient(:, :)   !! H = F - I (n,4) xx xy yx yy
     real(wp), allocatable :: control_memory(:, :)          !! of the relaxing control (n,4) [m]
-    real(wp), allocatable :: released(:, :)                !! change of the forces by the stage (n,2) [N/m^3]
+    real(wp), allocatable :: released(:, :)                !! by the stage, of f (n,2) [N/m^3]
     type(label_t), allocatable :: remembered(:)            !! columns of the history
     logical :: has_initial_strain = .false.                !! it is a field of this state
     logical :: in_stages = .false.                         !! `released` is needed

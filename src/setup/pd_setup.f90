@@ -31,8 +31,9 @@ contains
   !>
   !> Errors: a cut that crosses no bond, points that coincide, families that are too small, no free
   !> point, a pressure that acts on no point, a platen under a traction with points of different
-  !> density, a relaxing control of families whose bonds are all equally long, a gradient that leaves
-  !> nothing of a material, a probe far from the body, an initial stress beyond the yield stress.
+  !> density, a relaxing control of families whose bonds are all equally long, a gradient that
+  !> leaves nothing of a material, a probe far from the body, an initial stress beyond the yield
+  !> stress.
   subroutine set_up_model(input, model, errors, stage)
     type(input_t),      intent(in)    :: input
     type(model_t),      intent(inout) :: model    !! in: with its body

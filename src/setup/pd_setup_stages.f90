@@ -60,7 +60,7 @@ contains
       [minval(whole%place, dim=1), maxval(whole%place, dim=1)], [2, 2])
   end subroutine set_up_stage_body
 
-  !> Columns and rows by which the places of a body are ahead of those of another one on its lattice.
+  !> Columns and rows by which the places of a body are ahead of those of another one.
   pure function places_apart(body, other) result(apart)
     type(body_t), intent(in) :: body, other
     integer :: apart(2)

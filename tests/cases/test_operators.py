@@ -81,7 +81,7 @@ def finished(run_case, folder, text, *options):
 
 def kind(column):
     """Return what a column of the history measures: columns of one kind share a unit."""
-    for word in ("_force_", "stress", "energy_error"):
+    for word in ("_force_", "_displacement_", "stress", "energy_error"):
         if word in column:
             return word
     energies = ("_energy", "_dissipation", "external_work")

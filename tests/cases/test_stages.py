@@ -163,13 +163,25 @@ def test_a_first_factor_that_is_not_borne_is_a_failure(run_case, tmp_path):
         ("end_time = 2.0", "end_time = 0.5", 2, "a stage ends before the one before it"),
         ("name = 'dig'", "name = 'press'", 2, "two stages have the same name"),
         (DIG, "excavate = 'left right'", 3, "a stage has no body"),
-        (DIG, "fill = 'left' /\n&stage name = 'again', end_time = 3.0, fill = 'left'", 2,
-         "the body is there already"),
+        (
+            DIG,
+            "fill = 'left' /\n&stage name = 'again', end_time = 3.0, fill = 'left'",
+            2,
+            "the body is there already",
+        ),
         (PRESS, f"{PRESS}, {DIG}", 2, "the body is not there"),
-        ("method = 'equilibrium', increments = 5, residual = 1.0e-6", "damping = 1.0", 2,
-         "stages go from equilibrium to equilibrium"),
-        ("increments = 5", "increments = 5, end_time = 3.0", 2,
-         "the end of the run is not that of the last stage"),
+        (
+            "method = 'equilibrium', increments = 5, residual = 1.0e-6",
+            "damping = 1.0",
+            2,
+            "stages go from equilibrium to equilibrium",
+        ),
+        (
+            "increments = 5",
+            "increments = 5, end_time = 3.0",
+            2,
+            "the end of the run is not that of the last stage",
+        ),
     ],
 )
 def test_what_stages_cannot_be_is_refused(run_case, tmp_path, old, new, status, message):
