@@ -271,8 +271,8 @@ FINDING = '[[finding]]\ntitle = "F"\nfound = "{a}"\n'
         (HEAD + "[set]\nimperfections = false\n", "line 6, set, imperfections: unknown group, "
          "did you mean 'imperfection'?; found: imperfections"),
         (HEAD + "[set]\nimperfection = 1\n", "set, imperfection: is a group: only false"),
-        (HEAD + "[set]\n'body.x_mim' = 'unset'\n", 'line 6, set, "body.x_mim": the file has no such '
-         "group; found: x_mim; allowed: a name of &body or 1 to 1"),
+        (HEAD + "[set]\n'body.x_mim' = 'unset'\n", 'line 6, set, "body.x_mim": the file has no '
+         "such group; found: x_mim; allowed: a name of &body or 1 to 1"),
         (HEAD + "[set]\n'body.x_mim' = 1\n", "set, \"body.x_mim\": unknown key, did you mean"),
         (HEAD + "[parameters]\nrho = [1, -2]\n[set]\n'material.density' = '=rho'\n",
          'line 8, set, "material.density": out of range; found: -2; allowed: > 0'),

@@ -262,6 +262,7 @@ contains
     model%body = body
     model%blocks = operators%domain%blocks
     call move_alloc(operators, model%operators)
+    model%shown = model%operators%storage
     model%materials = materials
     model%delta = delta
     model%points%position = body%position
