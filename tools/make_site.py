@@ -24,6 +24,11 @@ ROOT = Path(__file__).resolve().parents[1]
 # The documents in the order of their list, and the names of their pages.
 PAGES = {
     "doc/input.md": "input",
+    "doc/tutorials/footing.md": "tutorial_footing",
+    "doc/tutorials/slope.md": "tutorial_slope",
+    "doc/tutorials/wall.md": "tutorial_wall",
+    "doc/tutorials/excavation.md": "tutorial_excavation",
+    "doc/tutorials/hole.md": "tutorial_hole",
     "doc/model.md": "model",
     "doc/studies.md": "studies",
     "doc/results.md": "results",
