@@ -10,6 +10,7 @@ module pd_ground_checks
   use pd_kinds, only: is_set, wp
   use pd_namelist, only: max_problems
   use pd_namelist_groups, only: namelist_group_t, place_of
+  use pd_stages, only: first_stage, stage_t, there_at_first
   use pd_text, only: number_text
   implicit none
   private
@@ -96,7 +97,7 @@ contains
     real(wp) :: top, slack
 
     surcharge = input%initial_stress%surcharge
-    top = maxval(input%bodies%y_max)   ! unset: a cloud
+    top = maxval(input%bodies%y_max, mask=there_at_first(input))   ! unset: a cloud, polygons
     associate (surface => input%initial_stress%surface_y)
       if (.not. (is_set(surface) .and. is_set(top))) return
       slack = merge(1.0_wp, 1.0e-6_wp, input%discretisation%fit == 'nearest') &
@@ -116,11 +117,14 @@ contains
     type(namelist_group_t), intent(in)    :: groups(:)
     real(wp),               intent(in)    :: surcharge   !! [Pa]
     type(error_list_t),     intent(inout) :: errors
+    type(stage_t) :: first
     integer :: k
 
+    first = first_stage(input)
     do k = 1, size(input%pressures)
       associate (p => input%pressures(k))
-        if (p%ramp_time > 0.0_wp .or. .not. is_set(p%value) .or. p%side == '') cycle
+        if (p%ramp_time > 0.0_wp .or. .not. is_set(p%value)) cycle
+        if (p%side == '' .and. p%body == '' .or. .not. first%has_pressure(k)) cycle
         if (.not. fits(p%side, p%value)) call report('pressure', 'value', number_text(p%value))
       end associate
     end do
@@ -128,6 +132,7 @@ contains
     do k = 1, size(input%boundaries)
       associate (b => input%boundaries(k))
         if (size(b%traction) /= 2 .or. b%ramp_time > 0.0_wp) cycle
+        if (.not. first%has_boundary(k)) cycle
         if (.not. (fits(b%side, -b%traction(2)) .and. abs(b%traction(1)) <= 0.0_wp)) &
           call report('boundary', 'traction', &
           number_text(b%traction(1))//', '//number_text(b%traction(2)))

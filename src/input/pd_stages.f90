@@ -7,7 +7,7 @@ module pd_stages
   implicit none
   private
 
-  public :: stage_t, stages_of, stage_names, names_of_bodies, names_of_boundaries
+  public :: stage_t, stages_of, first_stage, stage_names, names_of_bodies, names_of_boundaries
   public :: names_of_pressures, named, there_at_first
 
   integer, parameter :: name_length = 80
@@ -56,6 +56,15 @@ contains
       end associate
     end do
   end function stages_of
+
+  !> The first stage.
+  pure type(stage_t) function first_stage(input) result(first)
+    type(input_t), intent(in) :: input
+
+    associate (stages => stages_of(input))
+      first = stages(1)
+    end associate
+  end function first_stage
 
   !> A stage with everything in it, from the beginning.
   pure type(stage_t) function everything(input) result(stage)

@@ -18,7 +18,7 @@ module pd_setup
   use pd_setup_sight, only: look_around
   use pd_shape_tensor, only: invert_shape_tensors
   use pd_sight, only: sight_t
-  use pd_stages, only: stage_t, stages_of
+  use pd_stages, only: first_stage, stage_t
   use pd_storage, only: lattice_storage
   implicit none
   private
@@ -43,9 +43,7 @@ contains
     type(horizon_t) :: horizon
     type(sight_t), allocatable :: sight
 
-    associate (stages => stages_of(input))
-      present_stage = stages(1)
-    end associate
+    present_stage = first_stage(input)
     if (present(stage)) present_stage = stage
     model%at_equilibrium = input%integration%method == 'equilibrium'
     model%spacing = input%discretisation%spacing

@@ -13,7 +13,7 @@ module pd_setup_initial_stress
   use pd_forces, only: internal_forces
   use pd_input_types, only: input_t
   use pd_kinds, only: is_set, wp
-  use pd_model, only: model_t, top_of
+  use pd_model, only: model_t
   use pd_relaxing, only: whole_family, whole_family_t
   use pd_state, only: block_work_t, state_t
   use pd_tensors, only: deviator, von_mises
@@ -62,7 +62,7 @@ contains
     real(wp) :: surface
 
     associate (given => input%initial_stress)
-      surface = top_of(model)
+      surface = model%body%upper(2)
       if (is_set(given%surface_y)) surface = given%surface_y
       stress(:, 2) = -(given%surcharge + given%unit_weight &
         * (surface - model%body%position(:, 2)))
