@@ -189,3 +189,53 @@ def test_what_stages_cannot_be_is_refused(run_case, tmp_path, old, new, status, 
     done = run_case(BLOCKS.replace(old, new), tmp_path, "--check")
     assert done.returncode == status, done.stderr
     assert message in done.stderr
+
+
+GROUND = """\
+&run name = 'case', output_dir = 'out' /
+&discretisation spacing = 0.1, horizon = 0.3, layout = 'cells' /
+&body name = 'ground', x_min = 0.0, x_max = 2.0, y_min = 0.0, y_max = 1.0 /
+&body name = 'bank', x_min = 0.0, x_max = 2.0, y_min = 1.0, y_max = 1.5 /
+&material model = 'elastic', density = 2000.0, youngs_modulus = 50.0e6, poissons_ratio = 0.3 /
+&boundary name = 'base', side = 'bottom' /
+&boundary name = 'left', side = 'left', contact = 'smooth' /
+&boundary name = 'right', side = 'right', contact = 'smooth' /
+&gravity acceleration = 0.0, -10.0 /
+&initial_stress surface_y = 1.0, unit_weight = 20.0e3, k0 = 0.5 /
+&stage name = 'rest', end_time = 1.0 /
+&stage name = 'fill', end_time = 2.0, fill = 'bank' /
+&stage name = 'dig', end_time = 3.0, excavate = 'bank' /
+&integration method = 'equilibrium', increments = 5, residual = 1.0e-6 /
+&stabilisation method = 'relaxing' /
+&output frame_count = 3 /
+"""
+
+
+def test_fill_brings_its_weight_and_takes_it_away_again(run):
+    rows, last, _ = run(GROUND)
+    at = {k: rows["base_force_y"][np.abs(rows["time"] - k).argmin()] for k in (1.0, 2.0, 3.0)}
+    assert np.abs(rows["base_displacement_y"]).max() == 0.0
+    # the fill, and the layers beside it that slide
+    assert at[2.0] - at[1.0] == pytest.approx(20.0e3 * 0.5 * 2.6, rel=0.1)
+    assert at[3.0] == pytest.approx(at[1.0], rel=1e-3)
+    there = (last["boundary"] == 0) & (last["active"] == 1.0)
+    # near the surface families change twice; what they leave is small against the 0.15 mm of the fill
+    assert np.abs(last["displacement"][there]).max() < 2e-5
+    deep = there & (np.abs(last["position"] - [1.0, 0.3]) < [0.5, 0.2]).all(axis=1)
+    depth = 1.0 - last["position"][deep, 1]
+    assert last["stress"][deep, 1] == pytest.approx(-20.0e3 * depth, rel=5e-2)
+
+
+def test_digging_in_ground_under_its_stress_lets_it_rise(run):
+    text = GROUND.replace("fill = 'bank'", "excavate = 'bank'")
+    text = text.replace("&stage name = 'dig', end_time = 3.0, excavate = 'bank' /\n", "")
+    rows, last, _ = run(text.replace("surface_y = 1.0", "surface_y = 1.5"))
+    there = (last["boundary"] == 0) & (last["active"] == 1.0)
+    deep = there & (np.abs(last["position"] - [1.0, 0.3]) < [0.5, 0.2]).all(axis=1)
+    depth = 1.0 - last["position"][deep, 1]
+    assert last["stress"][deep, 1] == pytest.approx(-20.0e3 * depth, rel=5e-2)
+    modulus = 50.0e6 * 0.7 / (1.3 * 0.4)  # constrained
+    top = there & (last["position"][:, 1] > 0.9)
+    rise = last["displacement"][top, 1].mean()
+    assert rise == pytest.approx(10.0e3 * 0.95 / modulus, rel=0.15)
+    assert np.abs(rows["energy_error"]).max() < 1e-2
