@@ -173,7 +173,8 @@ def compare_with_finest(rows: list[Found]) -> None:
             row.variant = Variant(**{**vars(row.variant), "low": low, "high": high})
 
 
-def write(rows: list[Found]) -> None:
+def write(rows: list[Found], failures: list[str]) -> None:
+    """The table for the page, and what is not in it."""
     RESULTS.mkdir(parents=True, exist_ok=True)
     lines = table(rows)
     lines.insert(1, ["---"] * len(lines[0]))
@@ -185,6 +186,7 @@ def write(rows: list[Found]) -> None:
         f"one thread a run, {date.today().isoformat()}:\n"
     ]
     text += ["| " + " | ".join(line) + " |" for line in lines]
+    text += ["", *(f"- No limit: {failure}." for failure in failures)] if failures else []
     (RESULTS / "limit_loads.md").write_text("\n".join(text) + "\n")
 
 
@@ -222,20 +224,24 @@ def main() -> int:
             try:
                 rows.append(job.result())
             except (PostError, RuntimeError, KeyError) as problem:
-                failures.append(f"{name} {variant.title} {CASES[name].grids[grid][0]}: {problem}")
+                case = CASES[name]
+                what = ", ".join(filter(None, (case.title, variant.title, case.grids[grid][0])))
+                failures.append(f"{what}: {str(problem).split('.h5: ')[-1].strip()}")
     compare_with_finest(rows)
     lines = table(rows)
     widths = [max(len(line[k]) for line in lines) for k in range(len(lines[0]))]
     for line in lines:
         print("  ".join(text.ljust(width) for text, width in zip(line, widths)).rstrip())
-    pictures = []
+    shown: dict[str, Found] = {}
     for row in rows:
         if row.finest or options.quick:
-            pictures.append(RESULTS / f"{row.variant.input}.png")
-            draw(row).savefig(pictures[-1], dpi=200)
+            shown.setdefault(row.variant.input, row)
+    pictures = [RESULTS / f"{name}.png" for name in shown]
+    for row, picture in zip(shown.values(), pictures):
+        draw(row).savefig(picture, dpi=200)
     if not options.cases and not options.quick:
-        write(rows)
-        if options.publish and not failures:
+        write(rows, failures)
+        if options.publish:
             publish(pictures)
     for failure in failures:
         print("could not run:", failure, file=sys.stderr)
