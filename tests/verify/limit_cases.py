@@ -284,7 +284,7 @@ CASES: dict[str, Case] = {
         "Smooth wall, gamma h^2 / 2 -+ 2 c h",
         "kN/m",
         (
-            Variant("active", "wall_active", settled("wall"), 15.0, 15.0, 2.0e-2),
+            Variant("active", "wall_active", settled("wall", -1.0), 15.0, 15.0, 2.0e-2),
             Variant("passive", "wall_passive", settled("wall"), 45.0, 45.0, 2.0e-2),
         ),
         HEIGHT,
