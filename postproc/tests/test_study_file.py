@@ -151,22 +151,6 @@ def test_cases_are_combined_with_parameters(load: Any) -> None:
     assert study.runs[2].values.text().count("contact = 'rough'") == 1
 
 
-def test_blocks_are_put_in_where_they_are_used_and_set_prevails(load: Any) -> None:
-    block = "[block.short]\n'body.y_max' = '=height'\n'integration.damping' = 1.0e5\n"
-    cases = (
-        "[[case]]\nvalues = { height = 0.7 }\nuse = 'short'\n"
-        "[[case]]\nvalues = { height = 0.8 }\nuse = ['short']\nset = { 'body.y_max' = 0.9 }\n"
-        "[[case]]\nvalues = { height = 0.6 }\n"
-    )
-    found = [
-        [run.values.numbers(*key)[0] for key in (("body", "y_max"), ("integration", "damping"))]
-        for run in load(HEAD + block + cases).runs
-    ]
-    assert found == [[0.7, 1.0e5], [0.9, 1.0e5], [1.0, 5.0e5]]
-    at_top = load("use = 'short'\n" + HEAD + "[parameters]\nheight = 0.5\n" + block).runs
-    assert at_top[0].values.numbers("body", "y_max") == [0.5]
-
-
 def test_series_add_to_what_stands_at_the_top(load: Any) -> None:
     study = load(
         HEAD + 'label = "{m} of {case}"\nstrain = 0.004\n[parameters]\nm = [1, 2]\nn = 0.5\n'
@@ -278,13 +262,6 @@ FINDING = '[[finding]]\ntitle = "F"\nfound = "{a}"\n'
         ('label = "same"\n' + SWEPT, "line 1, label: the runs m_1 and m_2 have the same label"),
         ('label = "{m:%q}"\n' + SWEPT, "line 1, label: is no label"),
         (HEAD + "[[case]]\nlabel = 'a'\n", "line 5, case 1: a case needs values, use or set"),
-        (HEAD + "use = 'b'\n[block.a]\n'body.x_min' = 1\n",
-         'line 5, use: unknown block; found: "b"; allowed: a'),
-        (HEAD + "use = 'a'\n[block.a]\n'body.x_mim' = 1\n",
-         "line 7, block, a, \"body.x_mim\": unknown key, did you mean"),
-        (HEAD + "[block.a]\n'body.x_min' = 0.1\n", 'line 5, block, a: nothing says use = "a"'),
-        (HEAD + "[block.a]\n'run.name' = 'a'\n",
-         "line 6, block, a, \"run.name\": is set by the study"),
         (SWEPT + "[[case]]\nvalues = { m = 1 }\n", "line 8, case 1, values, m: m is one of"),
         (HEAD + "[[case]]\nvalue = { m = 1 }\n", "line 6, case 1, value: unknown key, did you"),
         (HEAD + "[set]\n'run.name' = 'a'\n", 'line 6, set, "run.name": is set by the study'),
