@@ -261,7 +261,7 @@ FINDING = '[[finding]]\ntitle = "F"\nfound = "{a}"\n'
         ('label = "{n}"\n' + SWEPT, "line 1, label: unknown name {n}"),
         ('label = "same"\n' + SWEPT, "line 1, label: the runs m_1 and m_2 have the same label"),
         ('label = "{m:%q}"\n' + SWEPT, "line 1, label: is no label"),
-        (HEAD + "[[case]]\nlabel = 'a'\n", "line 5, case 1: a case needs values or set"),
+        (HEAD + "[[case]]\nlabel = 'a'\n", "line 5, case 1: a case needs values, use or set"),
         (SWEPT + "[[case]]\nvalues = { m = 1 }\n", "line 8, case 1, values, m: m is one of"),
         (HEAD + "[[case]]\nvalue = { m = 1 }\n", "line 6, case 1, value: unknown key, did you"),
         (HEAD + "[set]\n'run.name' = 'a'\n", 'line 6, set, "run.name": is set by the study'),

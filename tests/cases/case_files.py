@@ -3,6 +3,8 @@
 import csv
 import os
 import re
+import subprocess
+import time
 
 import numpy as np
 
@@ -38,6 +40,20 @@ SPECIMEN = """\
 """
 
 
+# A sheet that is stretched or squeezed in both directions.
+SHEET = """\
+&run name = 'case', output_dir = 'out' /
+&discretisation spacing = 0.1, horizon = 0.25 /
+&body x_min = 0.0, x_max = 0.5, y_min = 0.0, y_max = 1.0 /
+&material model = 'elastic', strain_measure = '{measure}', density = 2000.0
+  youngs_modulus = 50.0e6, poissons_ratio = 0.3 /
+&boundary name = 'round', side = 'all', contact = 'affine'
+  velocity_gradient = {rate}, 0.0, 0.0, {rate} /
+&integration end_time = 3.0, safety = 0.9, damping = 5.0e4 /
+&output history_count = 300, frame_count = 2 /
+"""
+
+
 def changed(text, **changes):
     """Return an input with values replaced: key='new value', None takes the key out."""
     for key, value in changes.items():
@@ -51,6 +67,28 @@ def changed(text, **changes):
 def without_group(text, group):
     """Return an input without a group."""
     return re.sub(rf"&{group}\b[^/]*/\n", "", text)
+
+
+def begin(program, folder, text, *options):
+    """Start a run in the background."""
+    (folder / "run.nml").write_text(uncontrolled(text))
+    return subprocess.Popen(
+        [program, "--quiet", "--threads", "1", *options, "run.nml"],
+        cwd=folder,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+    )
+
+
+def stop(process, number, folder, rows):
+    """Send a signal when the history has grown to some rows; return the exit status."""
+    path = folder / "out" / "case_history.csv"
+    while process.poll() is None:
+        if path.exists() and path.read_bytes().count(b"\n") > rows:
+            process.send_signal(number)
+            break
+        time.sleep(0.001)
+    return process.wait(timeout=300)
 
 
 def history(path):

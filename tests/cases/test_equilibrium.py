@@ -5,7 +5,7 @@ import signal
 import h5py
 import numpy as np
 import pytest
-from case_files import SPECIMEN, changed, history, same_points_and_frames
+from case_files import SPECIMEN, begin, changed, history, same_points_and_frames, stop
 
 CONTROL = "&stabilisation method = 'relaxing' /\n"
 RESTING = SPECIMEN.replace(
@@ -145,8 +145,6 @@ def test_threads_change_no_bit(run_case, tmp_path):
 
 
 def test_a_restart_changes_no_bit(program, run_case, tmp_path):
-    from test_restart import begin, stop
-
     text = changed(RESTING, increments="400", history_count="400")
     (tmp_path / "whole").mkdir()
     (tmp_path / "parts").mkdir()

@@ -2,13 +2,21 @@
 
 import random
 import signal
-import subprocess
 import time
 from pathlib import Path
 
 import h5py
 import pytest
-from case_files import SPECIMEN, changed, contents, history, same_points_and_frames, uncontrolled
+from case_files import (
+    SHEET,
+    SPECIMEN,
+    begin,
+    changed,
+    contents,
+    history,
+    same_points_and_frames,
+    stop,
+)
 
 # Long enough to be hit in the middle by a signal, with many rows and frames.
 LONG = changed(SPECIMEN, final_strain="0.04", history_count="400", spacing="0.05", horizon="0.16")
@@ -26,28 +34,6 @@ def straight(run_case, tmp_path_factory):
     done = run_case(LONG, folder, "--quiet", "--threads", "1")
     assert done.returncode == 0, done.stderr
     return folder / "out"
-
-
-def begin(program, folder, text, *options):
-    """Start the long run in the background."""
-    (folder / "run.nml").write_text(uncontrolled(text))
-    return subprocess.Popen(
-        [program, "--quiet", "--threads", "1", *options, "run.nml"],
-        cwd=folder,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-    )
-
-
-def stop(process, number, folder, rows):
-    """Send a signal when the history has grown to some rows; return the exit status."""
-    path = folder / "out" / "case_history.csv"
-    while process.poll() is None:
-        if path.exists() and path.read_bytes().count(b"\n") > rows:
-            process.send_signal(number)
-            break
-        time.sleep(0.001)
-    return process.wait(timeout=300)
 
 
 def assert_same(folder, straight):
@@ -100,18 +86,11 @@ def test_a_run_that_was_stopped_goes_on_as_if_it_were_not(
     assert_same(tmp_path / "out", straight)
 
 
-# A sheet that is stretched until its time step has become shorter several times.
-STRETCHED = """\
-&run name = 'case', output_dir = 'out' /
-&discretisation spacing = 0.05, horizon = 0.125 /
-&body x_min = 0.0, x_max = 0.5, y_min = 0.0, y_max = 1.0 /
-&material model = 'elastic', strain_measure = 'green_lagrange', density = 2000.0
-  youngs_modulus = 50.0e6, poissons_ratio = 0.3 /
-&boundary name = 'round', side = 'all', contact = 'affine'
-  velocity_gradient = 0.1, 0.0, 0.0, 0.1 /
-&integration end_time = 3.0, damping = 5.0e4 /
-&output history_count = 3000, frame_count = 10 /
-"""
+# Stretched until its time step has become shorter several times.
+STRETCHED = changed(
+    SHEET.format(measure="green_lagrange", rate=0.1),
+    spacing="0.05", horizon="0.125", safety=None, history_count="3000", frame_count="10",
+)  # fmt: skip
 
 
 def test_a_run_goes_on_with_the_time_step_that_it_had(program, run_case, tmp_path):

@@ -7,7 +7,7 @@ import re
 import h5py
 import numpy as np
 import pytest
-from case_files import SPECIMEN, changed, history
+from case_files import SHEET, SPECIMEN, changed, history
 
 SPACING, DENSITY, YOUNGS = 0.1, 2000.0, 50.0e6
 STEPS = 300  # about
@@ -152,18 +152,6 @@ def test_a_row_with_a_wrong_energy_is_doubted_and_then_not_called_good(run_case,
     assert (np.abs(error[:-2]) < 0.01).all()
 
 
-# A sheet that is stretched or squeezed in both directions.
-SHEET = """\
-&run name = 'case', output_dir = 'out' /
-&discretisation spacing = 0.1, horizon = 0.25 /
-&body x_min = 0.0, x_max = 0.5, y_min = 0.0, y_max = 1.0 /
-&material model = 'elastic', strain_measure = '{measure}', density = 2000.0
-  youngs_modulus = 50.0e6, poissons_ratio = 0.3 /
-&boundary name = 'round', side = 'all', contact = 'affine'
-  velocity_gradient = {rate}, 0.0, 0.0, {rate} /
-&integration end_time = 3.0, safety = 0.9, damping = 5.0e4 /
-&output history_count = 300, frame_count = 2 /
-"""
 STIFFENING = (("green_lagrange", 0.1), ("logarithmic", -0.1))
 SHORTENED = "time step shortened to "
 

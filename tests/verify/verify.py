@@ -666,6 +666,27 @@ def compression_at_equilibrium() -> list[Row]:
     ]
 
 
+def compression_equilibrium() -> list[Row]:
+    """What the input of the path of equilibrium tells its reader to expect."""
+    result = shipped("compression_equilibrium", threads=2)
+    curve = stress_strain(result)
+    top, strain_at_top = peak(curve)
+    frame = result.frame(strain=0.010)
+    largest = float(np.max(frame["plastic_strain"][result.body]))
+    ratio = measure_band(result, strain=0.010).bands.ratio
+    given = "its input"
+    lines = [
+        ("peak axial stress", "kPa", 173.0, top / 1e3, 3.0e-3, given),
+        ("strain at the peak", "%", 0.345, 100.0 * strain_at_top, 1.0e-2, given),
+        ("axial stress at 1 %", "kPa", 29.0, curve.at(0.010) / 1e3, 2.0e-2, given),
+        ("largest alpha at 1.0 %", "1", 0.23, largest, 2.5e-2, given),
+    ]  # fmt: skip
+    name = "path of equilibrium"
+    rows = [Row(name, f"{what}, {name}", *rest) for what, *rest in lines]
+    one_band = f"weaker over stronger band at 1 %, {name}: one band"
+    return [*rows, Row(name, one_band, "1", 0.0, ratio, 0.25, given, scale=1.0)]
+
+
 def compression() -> list[Row]:
     """The reference case against an independent calculation (doc/verification.md)."""
     result = shipped("compression")
@@ -756,6 +777,7 @@ CASES: dict[str, Callable[[], list[Row]]] = {
     "perfect": perfect,
     "footing": footing,
     "compression_at_equilibrium": compression_at_equilibrium,
+    "compression_equilibrium": compression_equilibrium,
 }
 
 

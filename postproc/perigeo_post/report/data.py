@@ -12,16 +12,9 @@ from pydantic import BaseModel, ConfigDict, TypeAdapter
 
 from ..read.errors import ResultError
 from ..study.record import (
-    AGREES,
-    DIFFERS,
     DONE,
     FAILED,
-    HOLDS,
-    HOLDS_IN_PART,
-    HOLDS_NOT,
-    IN_PART,
     MISSING,
-    NO_RESULT,
     VERDICTS,
     FigureRecord,
     Needed,
@@ -40,8 +33,7 @@ else:
 
 # What the pages need of a study stands in its record.
 __all__ = [
-    "AGREES", "DIFFERS", "DONE", "FAILED", "HOLDS", "HOLDS_IN_PART", "HOLDS_NOT", "IN_PART",
-    "MISSING", "NO_RESULT", "VERDICTS",
+    "DONE", "FAILED", "MISSING", "VERDICTS",
     "CheckRow", "FigureRecord", "Finding", "Material", "RunRecord", "Study", "gather",
     "known_studies", "rank", "read_checks", "read_table",
 ]  # fmt: skip

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
-from .data import (
+from ..study.record import (
     AGREES,
     DIFFERS,
     DONE,

@@ -14,7 +14,7 @@ from typing import Any
 from .expressions import nearest
 from .findings import Finding, Known, checked_finding
 from .inputs import Inputs
-from .level import Level, level_of
+from .level import Blocks, Level, level_of
 from .plan import PlannedRun, Planner, has_frame
 from .tables import COUNTED, FIGURE_KEYS, FIXED, LAST, StudyTable, read_tables
 from .toml import Key, Problems, StudyError, read_toml
@@ -121,18 +121,21 @@ def _readable(base: str, path: Path, place: Key, problems: Problems) -> bool:
 
 def _levels(top: StudyTable, kinds: Kinds, problems: Problems) -> dict[str, Level]:
     """Contents of the series by their names; the file itself is one where it names none."""
-    whole = level_of(top, (), top.name)
+    blocks = Blocks(top.block, problems)
+    whole = level_of(top, (), top.name, blocks)
     whole.measures = problems.known(("measures",), whole.measures, kinds.measures, "measure")
     if not top.series:
+        blocks.check()
         return {top.name: whole}
     levels: dict[str, Level] = {}
     for k, table in enumerate(top.series):
         if table.name in levels:
             problems.add(("series", k, "name"), "two series have the same name", table.name)
-        level = level_of(table, ("series", k), table.name)
+        level = level_of(table, ("series", k), table.name, blocks)
         place = level.at("measures")
         level.measures = problems.known(place, level.measures, kinds.measures, "measure")
         levels[table.name] = level.below(whole)
+    blocks.check()
     return levels
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..measure.growth import change_of, first_yield, ridge_growth
-from ..measure.pattern import pattern_of
+from ..measure.pattern import Pattern, pattern_of
 from ..read.run import Run
 from .parts import Part, Values, frame_of, measure_group, value_or
 from .types import Column, State
@@ -13,6 +13,11 @@ from .types import Column, State
 PEAK, SOON, FORMED = 0.0035, 0.0040, 0.0060
 STATES = {"1_0": 0.010, "1_3": 0.013}  # at which the two bands are compared
 PARTS = {"change_begins": 0.9, "change_half": 0.5, "change_over": 0.1}
+
+# Of the two bands of a state, here and in measures.py.
+RATIO = "weaker over stronger band, plastic strain so far"
+RATIO_GROWING = "the same of what was added since the frame before"
+NOT_GROWN = "there is no earlier frame, or no band in what has grown since"
 
 _YIELD = {
     "first_yield_strain": Column("1", "nominal strain of the first row with plastic strain"),
@@ -36,15 +41,19 @@ _CHANGE = {
 }
 _RATIOS = {
     name: {
-        f"band_ratio_{name}": Column(
-            "1", f"weaker over stronger band, plastic strain so far, at {100 * strain:g} %"
-        ),
-        f"band_ratio_growing_{name}": Column(
-            "1", "the same of what was added since the frame before"
-        ),
+        f"band_ratio_{name}": Column("1", f"{RATIO}, at {100 * strain:g} %"),
+        f"band_ratio_growing_{name}": Column("1", RATIO_GROWING),
     }
     for name, strain in STATES.items()
 }
+
+
+def band_ratios(found: Pattern, ending: str = "") -> Values:
+    """Both ratios of the bands of a state, in columns with this ending."""
+    return {
+        f"band_ratio{ending}": value_or(found.ratio, f"the pattern is {found.name}"),
+        f"band_ratio_growing{ending}": value_or(found.ratio_growing, NOT_GROWN),
+    }
 
 
 def _first_yield(run: Run, state: State) -> Values:
@@ -78,13 +87,7 @@ def _change(run: Run, state: State) -> Values:
 
 def _ratios(name: str) -> Part:
     def take(run: Run, state: State) -> Values:
-        found = pattern_of(frame_of(run, State(STATES[name])))
-        return {
-            f"band_ratio_{name}": value_or(found.ratio, f"the pattern is {found.name}"),
-            f"band_ratio_growing_{name}": value_or(
-                found.ratio_growing, "there is no earlier frame, or no band in what has grown since"
-            ),
-        }
+        return band_ratios(pattern_of(frame_of(run, State(STATES[name]))), f"_{name}")
 
     return take
 

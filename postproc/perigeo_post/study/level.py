@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 from .tables import CaseTable, LevelTable
-from .toml import Key
+from .toml import Key, Problems
 from .types import Value
 
 Edit = tuple[Key, str, Any]  # place in the study file, key of the namelist, value
@@ -67,17 +68,44 @@ class Level:
         )
 
 
-def level_of(table: LevelTable, place: Key, name: str) -> Level:
+@dataclass(frozen=True)
+class Blocks:
+    """Settings that stand once in the file, and are put in where `use` names them."""
+
+    settings: Mapping[str, Mapping[str, Any]]
+    problems: Problems
+    used: set[str] = field(default_factory=set)
+
+    def edits(self, table: LevelTable | CaseTable, place: Key) -> list[Edit]:
+        """The changes of a table: those of its blocks first, so that its own prevail."""
+        names = self.problems.known((*place, "use"), table.use, self.settings, "block")
+        self.used.update(names)
+        theirs = [
+            (("block", name, key), key, value)
+            for name in names
+            for key, value in self.settings[name].items()
+        ]
+        own = [((*place, "set", key), key, value) for key, value in table.set.items()]
+        return [*theirs, *own]
+
+    def check(self) -> None:
+        """Complain about blocks that nothing uses."""
+        for name in self.settings:
+            if name not in self.used:
+                self.problems.add(("block", name), f'nothing says use = "{name}"')
+
+
+def level_of(table: LevelTable, place: Key, name: str, blocks: Blocks) -> Level:
     """The contents of a table of the study file; `name` stands for a title."""
     parameters = table.parameters.items()
     return Level(
         swept={key: value for key, value in parameters if isinstance(value, list)},
         fixed={key: value for key, value in parameters if not isinstance(value, list)},
         cases=[
-            Case(case.label, dict(case.values), _edits(case, (*place, "case", number)))
+            Case(case.label, dict(case.values), blocks.edits(case, (*place, "case", number)))
             for number, case in enumerate(table.case)
         ],
-        edits=_edits(table, place),
+        edits=blocks.edits(table, place),
         measures=list(table.measures),
         label=table.label,
         strain=table.strain,
@@ -87,7 +115,3 @@ def level_of(table: LevelTable, place: Key, name: str) -> Level:
         place=place,
         title=table.title or name,
     )
-
-
-def _edits(table: LevelTable | CaseTable, place: Key) -> list[Edit]:
-    return [((*place, "set", key), key, value) for key, value in table.set.items()]

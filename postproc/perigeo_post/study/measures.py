@@ -32,7 +32,7 @@ from ..read.errors import FieldNotFoundError, RequestError
 from ..read.points import FloatArray
 from ..read.run import Run
 from .control import CONTROL
-from .growth import CHANGE, START
+from .growth import CHANGE, NOT_GROWN, RATIO, RATIO_GROWING, START, band_ratios
 from .loads import COST, LOAD
 from .parts import Part, Values, frame_of, measure_group, value_or
 from .types import Column, Measure, State
@@ -143,8 +143,8 @@ _BAND = {
     "profile_mirrored": Column("1", "true: the given line was mirrored to cross the band"),
 }
 _PATTERN = {
-    "band_ratio": Column("1", "weaker over stronger band, plastic strain so far"),
-    "band_ratio_growing": Column("1", "the same of what was added since the frame before"),
+    "band_ratio": Column("1", RATIO),
+    "band_ratio_growing": Column("1", RATIO_GROWING),
     "pattern": Column("1", "X: weaker band from 0.25 of the stronger on; single; diffuse; none"),
     "pattern_growing": Column("1", "the same of what was added, X from 0.5 on"),
 }
@@ -202,12 +202,10 @@ def _band(run: Run, state: State) -> Values:
 
 def _pattern(run: Run, state: State) -> Values:
     found = pattern_of(frame_of(run, state))
-    nothing = "there is no earlier frame, or no band in what has grown since"
     return {
-        "band_ratio": value_or(found.ratio, f"the pattern is {found.name}"),
-        "band_ratio_growing": value_or(found.ratio_growing, nothing),
+        **band_ratios(found),
         "pattern": found.name,
-        "pattern_growing": value_or(found.growing, nothing),
+        "pattern_growing": value_or(found.growing, NOT_GROWN),
     }
 
 

@@ -206,12 +206,13 @@ class CaseTable(_Table):
 
     label: Text = ""
     values: dict[ParameterName, Plain] = {}
+    use: Texts = []
     set: Settings = {}
 
     @model_validator(mode="after")
     def _says_something(self, info: ValidationInfo) -> CaseTable:
-        if not self.values and not self.set and not info.context:
-            raise wrong("a case needs values or set", bare=True)
+        if not (self.values or self.use or self.set or info.context):
+            raise wrong("a case needs values, use or set", bare=True)
         return self
 
 
@@ -226,6 +227,7 @@ class LevelTable(_Table):
     measures: Texts = []
     label: Text = ""
     parameters: dict[ParameterName, Annotated[Any, AfterValidator(_parameter)]] = {}
+    use: Texts = []
     set: Settings = {}
     case: list[CaseTable] = []
 
@@ -327,6 +329,7 @@ class StudyTable(LevelTable):
     base: Needed
     tension_positive: Flag = False
     units: dict[str, Text] = {}
+    block: dict[Name, Settings] = {}
     series: list[SeriesTable] = []
     figure: list[FigureTable] = []
     finding: list[FindingTable] = []
