@@ -6,8 +6,8 @@ import signal
 import h5py
 import numpy as np
 import pytest
-from case_files import changed, history
-from test_restart import assert_same, begin, stop
+from case_files import begin, changed, history, stop
+from test_restart import assert_same
 
 # Two blocks side by side under a pressure; the right one is dug away.
 BLOCKS = """\
