@@ -205,13 +205,17 @@ COMPARED = {
         "compression to 4 %, hardening",
         finite,
         ((0.04, 0.12), (0.02, 0.06)),
-        {"finite_cpe8r_100": "8 nodes, h = 0.1 m", "finite_cpe8r_200": "8 nodes, h = 0.2 m"},
+        {
+            "finite_cpe8r_050": "8 nodes, h = 0.05 m",
+            "finite_cpe8r_100": "8 nodes, h = 0.1 m",
+            "finite_cpe8r_200": "8 nodes, h = 0.2 m",
+        },
     ),
     "cyclic": Case(
         "cyclic, kinematic hardening, logarithmic strain",
         "cyclic, kinematic hardening",
         cyclic,
-        ((0.04, 0.12), (0.02, 0.06)),
+        ((0.04, 0.12), (0.02, 0.06), (0.01, 0.03)),
         {"cyclic_cpe8r_100": "8 nodes, h = 0.1 m", "cyclic_cpe8r_200": "8 nodes, h = 0.2 m"},
     ),
     "footing": Case(

@@ -58,7 +58,7 @@ def draw_comparison(panels: list[Panel], path: Path) -> None:
             room = 0.35 * (high - low) if low < 0.0 else 0.0  # for the legend
             axes.set_ylim(1.05e-3 * low - 1e-3 * room, 1.08e-3 * high)
             axes.legend(loc="lower right")
-        figure.savefig(path, dpi=160)
+        figure.savefig(path, dpi=150)
 
 
 def draw_softening(families: list[Family], nonlocal_family: Family, path: Path) -> None:
@@ -104,4 +104,4 @@ def draw_softening(families: list[Family], nonlocal_family: Family, path: Path) 
         right.set_ylabel("work to 1.2 % [kJ/m]")
         right.set_title("(c) work, all of them", loc="left")
         right.legend(loc="upper left")
-        figure.savefig(path, dpi=160)
+        figure.savefig(path, dpi=150)

@@ -145,12 +145,19 @@ def deck(model: Model) -> str:
     lines += [f"{name}, {d}, {d}" for name, _, held in model.fixed for d in held]
     lines += ["*AMPLITUDE, NAME=WAY"]
     lines += [f"{time:.10g}, {way:.10g}" for time, way in model.way]
+    if len(model.way) > 2:
+        lines += ["*TIME POINTS, NAME=PRINTED, GENERATE"]
+        lines += [
+            f"{1.0 / model.increments:.10g}, {model.way[-1][0]:.10g}, {1.0 / model.increments:.10g}"
+        ]
     return "\n".join([*lines, *_step(model)]) + "\n"
 
 
 def _step(model: Model) -> list[str]:
     end, step = model.way[-1][0], 1.0 / model.increments
     large = ", NLGEOM" if model.finite else ""
+    turns = len(model.way) > 2  # increments have to end where the way turns round
+    at = ", TIME POINTS=PRINTED" if turns else ", FREQUENCY=1"
     kind = "*DYNAMIC, ALPHA=-0.3" if model.dynamic else "*STATIC"
     return [
         f"*STEP, INC=100000{large}",
@@ -161,7 +168,7 @@ def _step(model: Model) -> list[str]:
         "0.25, 0.5, 0.75, 0.85, , , 1.5, ",
         "*BOUNDARY, AMPLITUDE=WAY",
         "DRIVEN, 2, 2, 1.",
-        "*NODE PRINT, NSET=DRIVEN, TOTALS=ONLY, FREQUENCY=1",
+        f"*NODE PRINT, NSET=DRIVEN, TOTALS=ONLY{at}",
         "RF",
         "*END STEP",
     ]
