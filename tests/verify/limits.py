@@ -238,7 +238,7 @@ def main() -> int:
             shown.setdefault(row.variant.input, row)
     pictures = [RESULTS / f"{name}.png" for name in shown]
     for row, picture in zip(shown.values(), pictures):
-        draw(row).savefig(picture, dpi=200)
+        draw(row).savefig(picture, dpi=110)
     if not options.cases and not options.quick:
         write(rows, failures)
         if options.publish:
