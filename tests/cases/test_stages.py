@@ -219,7 +219,7 @@ def test_fill_brings_its_weight_and_takes_it_away_again(run):
     assert at[2.0] - at[1.0] == pytest.approx(20.0e3 * 0.5 * 2.6, rel=0.1)
     assert at[3.0] == pytest.approx(at[1.0], rel=1e-3)
     there = (last["boundary"] == 0) & (last["active"] == 1.0)
-    # near the surface families change twice; what they leave is small against the 0.15 mm of the fill
+    # near the surface families change twice; what they leave is small against 0.15 mm of the fill
     assert np.abs(last["displacement"][there]).max() < 2e-5
     deep = there & (np.abs(last["position"] - [1.0, 0.3]) < [0.5, 0.2]).all(axis=1)
     depth = 1.0 - last["position"][deep, 1]
