@@ -274,7 +274,7 @@ contains
     pressure%points = pack([(i, i=1, size(loaded))], loaded)
     allocate (pressure%force(size(pressure%points), 2))
     associate (points => pressure%points)
-      do c = 1, 2
+      do c = 1, merge(2, 0, size(points) > 0)
         pressure%force(:, c) = force(points, c) &
           + (total(c) - sum(force(points, c))) / sum(weight(points)) * weight(points)
       end do
