@@ -53,12 +53,27 @@ contains
         if (gravity > 0.0_wp) loads = loads//', with gravity of '//short_number(gravity)//' m/s^2'
       end associate
       call record_line(run%record, 'limit load: the last equilibrium is at '//short_number(t)// &
-        ' s, under loads of '//loads//'; there is none at '//tried, errors)
+        ' s'//stage_in_words(run)//', under loads of '//loads//'; there is none at '//tried, errors)
     end associate
+    if (size(run%input%strength_reduction) > 0) call record_line(run%record, &
+      'no factor of safety: the body does not bear the loads of the end of the run', errors)
     call outcome%end_if_any(errors, exit_file)
     if (.not. outcome%done) call finish_run(run, outcome)
     if (.not. outcome%done) call outcome%end_with(exit_ok)
   end subroutine end_without_equilibrium
+
+  !> How far the present stage has come; '' without stages.
+  pure function stage_in_words(run) result(text)
+    type(run_t), intent(in) :: run
+    character(:), allocatable :: text
+
+    text = ''
+    associate (stage => run%stages(run%clock%stage))
+      if (stage%name /= '') text = ', '//short_number(100.0_wp * (run%clock%time() &
+        - stage%start_time) / (stage%end_time - stage%start_time))//' % of the way through '// &
+        'stage '''//stage%name//''''
+    end associate
+  end function stage_in_words
 
   !> The row that moves fastest among those that are free: where a run fails that gains energy.
   pure integer function fastest_row(run)

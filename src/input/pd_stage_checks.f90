@@ -6,13 +6,13 @@ module pd_stage_checks
   use pd_errors, only: error_list_t
   use pd_input_checks, only: is_cloud
   use pd_input_types, only: input_t
-  use pd_input_values, only: group_named, is_given
+  use pd_input_values, only: group_named
   use pd_kinds, only: is_set, wp
   use pd_namelist, only: max_problems
   use pd_namelist_groups, only: namelist_group_t, place_of
   use pd_stages, only: named, names_of_bodies, names_of_boundaries, names_of_pressures, &
     stage_names, there_at_first
-  use pd_text, only: number_text, quoted_list
+  use pd_text, only: number_text, quoted_list, read_number
   implicit none
   private
 
@@ -92,7 +92,9 @@ contains
     type(namelist_group_t), intent(in)    :: groups(:)
     type(error_list_t),     intent(inout) :: errors
     type(namelist_group_t) :: integration
-    real(wp) :: end_time
+    character(:), allocatable :: problem
+    real(wp) :: end_time, given
+    integer  :: i
 
     if (size(input%stages) == 0) return
     if (is_cloud(input)) call errors%add('stages of a point cloud', &
@@ -107,23 +109,14 @@ contains
       allowed='&integration method = ''equilibrium''')
     integration = group_named(groups, 'integration', 1, input%path)
     end_time = input%stages(size(input%stages))%end_time
-    if (is_given(integration, 'end_time') .and. is_set(end_time)) then
-      if (abs(given_end() - end_time) > 0.0_wp) call errors%add( &
-        'the end of the run is not that of the last stage', &
-        where=place_of(integration, 'end_time'), found=number_text(given_end()), &
-        allowed=number_text(end_time)//' [s], or leave it out')
-    end if
-
-  contains
-
-    !> The end of the run as the file gives it.
-    real(wp) function given_end()
-      integer :: i
-
-      i = integration%find('end_time')
-      read (integration%entries(i)%values(1)%text, *) given_end
-    end function given_end
-
+    i = integration%find('end_time')
+    if (i == 0 .or. .not. is_set(end_time)) return
+    call read_number(integration%entries(i)%values(1)%text, given, problem)
+    if (problem /= '') return   ! that has been reported
+    if (abs(given - end_time) > 0.0_wp) call errors%add( &
+      'the end of the run is not that of the last stage', &
+      where=place_of(integration, 'end_time'), found=number_text(given), &
+      allowed=number_text(end_time)//' [s], or leave it out')
   end subroutine check_run
 
   !> Name and end of stage k.

@@ -6,6 +6,7 @@ module pd_setup_gravity
   use pd_input_types, only: input_t
   use pd_kinds, only: wp
   use pd_model, only: model_t
+  use pd_setup_materials, only: is_bearing
   use pd_setup_surface, only: taken
   use pd_text, only: short_number
   implicit none
@@ -17,7 +18,8 @@ contains
 
   !> b = rho g on all points. Those of a boundary have none in the components in which it transfers
   !> forces: they are moved there, and their weight would only come back as a reaction. Where they
-  !> slide they stand for a body that goes on, and carry their own weight.
+  !> slide they stand for a body that goes on, and carry their own weight; bearings are no soil, and
+  !> have none.
   subroutine set_up_gravity(input, model)
     type(input_t), intent(in)    :: input
     type(model_t), intent(inout) :: model
@@ -54,7 +56,9 @@ contains
     mask = 1.0_wp
     do i = 1, size(boundary)
       if (boundary(i) == 0) cycle
-      where (taken(input%boundaries(boundary(i)))) mask(i, :) = 0.0_wp
+      associate (b => input%boundaries(boundary(i)))
+        where (taken(b) .or. is_bearing(b)) mask(i, :) = 0.0_wp
+      end associate
     end do
   end function carries
 

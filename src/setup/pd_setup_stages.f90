@@ -86,8 +86,8 @@ contains
   !> The points of all stages, with the largest volume that they have in any, in the order of the
   !> lattice; without stages n = 0.
   !>
-  !> Errors: those of `set_up_body`; a place that belongs to a body in one stage and to a boundary
-  !> in another.
+  !> Errors: those of `set_up_body`; a stage that changes no point although it digs or fills; a place
+  !> that belongs to a body in one stage and to a boundary in another.
   subroutine set_up_whole(input, stages, whole, input_errors, errors)
     type(input_t),      intent(in)    :: input
     type(stage_t),      intent(in)    :: stages(:)
@@ -97,11 +97,13 @@ contains
     type(body_t) :: bodies(size(stages)), none
     integer, allocatable :: owner(:, :), part(:, :)
     real(wp), allocatable :: volume(:, :), position(:, :, :)
-    integer :: apart(2, size(stages)), low(2), high(2), k, i
+    integer :: apart(2, size(stages)), low(2), high(2), before, k, i
 
     if (stages(1)%name == '') return
     do k = 1, size(stages)
       call set_up_stage_body(input, stages(k), none, bodies(k), unheard, input_errors, errors)
+      if (k > 1) call check_change(input, k, before, bodies(k)%n, errors)
+      before = bodies(k)%n
       if (errors%count() + input_errors%count() > 0) return
       apart(:, k) = -places_apart(bodies(k), bodies(1))
     end do
@@ -136,6 +138,21 @@ contains
       whole%upper(k) = maxval(bodies%upper(k))
     end do
   end subroutine set_up_whole
+
+  !> Where bodies overlap, one that goes or comes may leave all points as they are.
+  subroutine check_change(input, k, before, now, errors)
+    type(input_t),      intent(in)    :: input
+    integer,            intent(in)    :: k             !! number of the stage
+    integer,            intent(in)    :: before, now   !! points
+    type(error_list_t), intent(inout) :: errors
+
+    associate (stage => input%stages(k))
+      if ((stage%excavate /= '') .eqv. (stage%fill /= '')) return
+      if (now == before) call errors%add('what the stage excavates or fills changes no point', &
+        '&stage name = '//stage%name, stage%excavate//stage%fill, &
+        'bodies that no other body covers')
+    end associate
+  end subroutine check_change
 
   !> A point cannot turn from soil into a boundary, or back.
   subroutine report_change(position, name, errors)

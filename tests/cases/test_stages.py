@@ -176,6 +176,7 @@ def test_a_first_factor_that_is_not_borne_is_a_failure(run_case, tmp_path):
             2,
             "stages go from equilibrium to equilibrium",
         ),
+        ("increments = 5", "increments = 5, end_time = soon", 2, "text where a number is due"),
         (
             "increments = 5",
             "increments = 5, end_time = 3.0",
@@ -239,3 +240,29 @@ def test_digging_in_ground_under_its_stress_lets_it_rise(run):
     rise = last["displacement"][top, 1].mean()
     assert rise == pytest.approx(10.0e3 * 0.95 / modulus, rel=0.15)
     assert np.abs(rows["energy_error"]).max() < 1e-2
+
+
+def test_a_collapse_tells_how_far_its_stage_has_come(run):
+    """A pit of half a metre in clay that bears a third of it."""
+    text = GROUND.replace("model = 'elastic'", "model = 'j2', yield_stress = 3.0e3")
+    text = text.replace("k0 = 0.5", "k0 = 1.0").replace("surface_y = 1.0", "surface_y = 1.5")
+    text = text.replace("'bank', x_min = 0.0, x_max = 2.0", "'bank', x_min = 0.0, x_max = 1.0")
+    pit = "&body name = 'pit', x_min = 1.0, x_max = 2.0, y_min = 1.0, y_max = 1.5 /\n"
+    text = text.replace("&material", pit + "&material").replace("fill = 'bank'", "excavate = 'pit'")
+    text = text.replace("&stage name = 'dig', end_time = 3.0, excavate = 'bank' /\n", "")
+    rows, _, log = run(text + "&strength_reduction first = 1.0, last = 2.0 /\n")
+    part = re.search(r"limit load: .* (\S+) % of the way through stage 'fill'", log)
+    assert part
+    assert float(part[1]) == pytest.approx(100.0 * (rows["time"][-1] - 1.0), abs=0.1)
+    assert "no factor of safety" in log
+
+
+def test_a_stage_that_changes_no_point_is_refused(run_case, tmp_path):
+    inner = "&body name = 'inner', x_min = 0.5, x_max = 1.0, y_min = 0.0, y_max = 0.5 /\n"
+    text = GROUND.replace("&material", inner + "&material").replace(
+        "fill = 'bank'", "excavate = 'inner'"
+    )
+    text = text.replace("&stage name = 'dig', end_time = 3.0, excavate = 'bank' /\n", "")
+    done = run_case(text.replace("surface_y = 1.0", "surface_y = 1.5"), tmp_path, "--check")
+    assert done.returncode == 3, done.stderr
+    assert "changes no point" in done.stderr

@@ -117,14 +117,12 @@ def pressure_at_collapse(run: Run) -> float:
 
 
 def depth_at_collapse(run: Run) -> float:
-    """Depth of an excavation at its last equilibrium: whole stages and a part of one [m]."""
+    """Middle between the depth that stood and that of the stage which did not end [m]."""
     log = run.path.with_suffix(".log").read_text(encoding="utf-8")
     if "limit load:" not in log:
         raise PostError(f"{run.path}: the excavation has not collapsed")
-    begun = re.findall(r"stage 'to_(\d+)_cm' begins at (\S+) s", log)
-    depth, start = float(begun[-1][0]) / 100.0, float(begun[-1][1])
-    before = float(begun[-2][0]) / 100.0 if len(begun) > 1 else 0.0
-    return before + (depth - before) * (float(run.history()["time"][-1]) - start)
+    begun = [float(cm) / 100.0 for cm in re.findall(r"stage 'to_(\d+)_cm' begins", log)]
+    return 0.5 * sum(begun[-2:])
 
 
 def peak(boundary: str) -> Callable[[Run], float]:
@@ -321,10 +319,22 @@ CASES: dict[str, Case] = {
         "m",
         (
             Variant(
-                "", "excavation", depth_at_collapse, *(n / 2.0 for n in exact.VERTICAL_CUT), 3.0e-2
+                "default control",
+                "excavation",
+                depth_at_collapse,
+                *(n / 2.0 for n in exact.VERTICAL_CUT),
+                3.0e-2,
+            ),
+            Variant(
+                "no control",
+                "excavation",
+                depth_at_collapse,
+                *(n / 2.0 for n in exact.VERTICAL_CUT),
+                3.0e-2,
+                ("stabilisation.method=none",),
             ),
         ),
-        (("0.1 m", 0.1), ("0.05 m", 0.05)),
+        (("0.05 m", 0.05),),
         box=(-3.0, 2.0, -3.0, 0.2),
     ),
     "softening_footing": Case(
