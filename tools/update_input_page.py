@@ -19,6 +19,8 @@ def updated(page: str, reference: str) -> str:
     """Return the page with the sections of the reference, new ones behind the one before them."""
     new = {section[1]: section[0] for section in SECTION.finditer(reference)}
     old = {section[1]: section[0] for section in SECTION.finditer(page)}
+    if len(old) < len(SECTION.findall(page)):
+        raise SystemExit("a section stands twice on the page")
     for name in set(old) - set(new):
         raise SystemExit(f"the page has a section &{name}, the program has no such group")
     end = len(page)

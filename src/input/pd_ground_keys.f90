@@ -42,7 +42,7 @@ contains
     call visitor%list_key(key_t('acceleration', count=2, unit='m/s^2', required=.true., &
       also='not 0; with an initial stress 0 along x and downwards along y', &
       meaning='acceleration of gravity, x and y; points of boundaries have weight only where '// &
-      'they slide'), self%acceleration)
+      'they slide, bearings none'), self%acceleration)
     call visitor%real_key(key_t('ramp_time', unit='s', default='0.0', range=not_negative, &
       needs_effect=.true., also='not with an initial stress', &
       meaning='time in which it rises linearly from 0; 0: whole at once'), self%ramp_time)

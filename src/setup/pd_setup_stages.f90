@@ -86,8 +86,8 @@ contains
   !> The points of all stages, with the largest volume that they have in any, in the order of the
   !> lattice; without stages n = 0.
   !>
-  !> Errors: those of `set_up_body`; a stage that changes no point although it digs or fills; a place
-  !> that belongs to a body in one stage and to a boundary in another.
+  !> Errors: those of `set_up_body`; a stage that changes no point although it digs or fills; a
+  !> place that belongs to a body in one stage and to a boundary in another.
   subroutine set_up_whole(input, stages, whole, input_errors, errors)
     type(input_t),      intent(in)    :: input
     type(stage_t),      intent(in)    :: stages(:)

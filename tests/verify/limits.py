@@ -74,7 +74,7 @@ def draw(found: Found) -> Figure:
     """Plastic strain, how the soil moves at last, and the exact mechanism."""
     run = Run(found.path)
     frame = run.last_frame
-    body = run.body & (frame["active"] > 0.0 if "active" in run.field_names else True)
+    body = run.body & frame.there
     place = run.positions[body]
     alpha = frame["plastic_strain"][body]
     moving = np.column_stack([frame["velocity_x"][body], frame["velocity_y"][body]])
@@ -134,9 +134,9 @@ def table(rows: list[Found]) -> list[list[str]]:
     lines = [["case", "grid", "points", "time", "found", "exact", "error", "verdict"]]
     for row in rows:
         low, high = row.variant.low, row.variant.high
-        known = "none" if not np.isfinite(low) else f"{low:.4g}"
-        if high != low and np.isfinite(low):
-            known += f" to {high:.4g}"
+        known = "other grids"
+        if low is not None:
+            known = f"{low:.4g}" if high == low else f"{low:.4g} to {high:.4g}"
         title = row.case.title + (f", {row.variant.title}" if row.variant.title else "")
         verdict = ("holds" if row.holds else "does not hold") if row.finest else ""
         error = "" if not np.isfinite(row.error) else f"{100.0 * row.error:+.2f} %"
@@ -157,20 +157,13 @@ def table(rows: list[Found]) -> list[list[str]]:
 
 def compare_with_finest(rows: list[Found]) -> None:
     """Where nothing exact is known, the finest grid is what the others are compared with."""
-    for name, case in CASES.items():
-        if np.isfinite(case.variants[0].low):
-            continue
+    for case in CASES.values():
         those = [row for row in rows if row.case is case]
-        if len(those) < 2:
-            continue
-        values = [row.value for row in those]
-        middle = 0.5 * (min(values) + max(values))
-        spread = (max(values) - min(values)) / middle / 2.0
-        print(f"{name}: {spread:.2%} about the middle of all grids")
-        for row in those:
-            low = min(values) if spread <= row.variant.tolerance else middle
-            high = max(values) if spread <= row.variant.tolerance else middle
-            row.variant = Variant(**{**vars(row.variant), "low": low, "high": high})
+        if case.variants[0].low is None:
+            for row in those:
+                row.among = [one.value for one in those if one.finest]
+                if row.finest:
+                    row.among = [one.value for one in those]
 
 
 def write(rows: list[Found], failures: list[str]) -> None:
@@ -226,7 +219,7 @@ def main() -> int:
             except (PostError, RuntimeError, KeyError) as problem:
                 case = CASES[name]
                 what = ", ".join(filter(None, (case.title, variant.title, case.grids[grid][0])))
-                failures.append(f"{what}: {str(problem).split('.h5: ')[-1].strip()}")
+                failures.append(f"{what}: {str(problem).replace(f'{ROOT}/', '').strip()}")
     compare_with_finest(rows)
     lines = table(rows)
     widths = [max(len(line[k]) for line in lines) for k in range(len(lines[0]))]

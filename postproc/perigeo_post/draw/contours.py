@@ -83,7 +83,7 @@ def panel_of(
     """The data of one panel; `deformed` is the scale of the displacements, None: reference."""
     run = frame.run
     values = frame.scalar(field).values
-    keep = np.ones(len(values), dtype=bool) if fictitious else run.body
+    keep = frame.there if fictitious else run.body & frame.there
     if not keep.any():
         raise RequestError(f"{run.path} holds no points of the body")
     points = run.positions[keep]

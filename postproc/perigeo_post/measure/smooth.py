@@ -32,7 +32,6 @@ WIDTH = 8.0**-0.5  # s over horizon
 LEAST_WIDTH = 0.85  # s over spacing
 SINGULAR = 1.0e-9  # of the fit: a family on a line says nothing across it
 SOURCE = "displacement"
-THERE = "active"  # field of runs in which points come and go
 WORDS = "smoothed over families"
 
 
@@ -45,10 +44,7 @@ class SmoothedFrame(Frame):
         if found is None or name != SOURCE:
             return found
         run = self.run
-        keep = run.body & np.isfinite(found.values).all(axis=1)
-        there = super()._stored(THERE)
-        if there is not None:
-            keep &= there.values > 0.5
+        keep = run.body & self.there & np.isfinite(found.values).all(axis=1)
         values = np.array(found.values, dtype=float)
         values[keep] = family_values(
             run.positions[keep], values[keep], np.abs(run.volumes[keep]), run.horizon

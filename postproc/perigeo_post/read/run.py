@@ -69,6 +69,14 @@ class Frame:
     def __getitem__(self, name: str) -> FloatArray:
         return self.field(name).values
 
+    @property
+    def there(self) -> BoolArray:
+        """Which points are there: in a run with stages they come and go."""
+        active = self._stored("active")
+        if active is None:
+            return np.ones(len(self.run.volumes), dtype=bool)
+        return np.asarray(active.values > 0.5)
+
     def _stored(self, name: str) -> Field | None:
         found = dataset(self.run.path, f"{self.key}/{name}", name)
         if found is None and name in _fields.OF_THE_POINTS:
