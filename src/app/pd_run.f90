@@ -13,7 +13,7 @@ module pd_run
   use pd_input_types, only: input_t
   use pd_kinds, only: is_set, wp
   use pd_ledger, only: ledger_t, new_ledger
-  use pd_model, only: model_t, release_set_up, start
+  use pd_model, only: model_t, move_planes, release_set_up, start
   use pd_observe, only: column_t, moment_at, observation_t, observe
   use pd_record, only: load_checkpoint, observe_state, open_record, record_frame, record_line, &
     record_progress, record_row, record_t, results_in_the_way, same_history, same_points
@@ -300,7 +300,8 @@ contains
         state%strength = model%strength
         call add_release(run%stages(run%clock%stage), state, model)
         call ledger%fit(model%blocks)
-        call model%operators%take_in(state%displacement)
+        call move_planes(model, run%clock%time())
+        call model%operators%take_in(state%displacement, model%operators%mirror%place)
         call model%supports%take_reactions(model%points%volume, run%clock%time(), state%force)
       else
         call start(model, state)

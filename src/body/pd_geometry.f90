@@ -5,7 +5,7 @@
 module pd_geometry
   use pd_errors, only: error_list_t
   use pd_kinds, only: wp
-  use pd_layers, only: fill_edges, fill_layer, layer_t
+  use pd_layers, only: fill_edges, fill_layer, go_on_over_layers, layer_t
   use pd_places, only: empty, give_slivers, lattice_t, new_places, places_t, volume_at
   use pd_point_sets, only: side_t
   use pd_region, only: area_within, box_of, length_within, shape_t
@@ -107,6 +107,9 @@ contains
       else
         call fill_layer(layers(k), layers, corner, lattice, places)
       end if
+    end do
+    do k = 1, size(layers)
+      call go_on_over_layers(layers(k), corner, lattice, places)
     end do
     do k = 1, size(layers)
       if (.not. any(places%owner == layers(k)%boundary)) &

@@ -11,7 +11,7 @@ module pd_layers
   implicit none
   private
 
-  public :: layer_t, fill_layer, fill_edges
+  public :: layer_t, fill_layer, fill_edges, go_on_over_layers
 
   !> Fictitious points beyond one side, or beyond edges.
   type :: layer_t
@@ -22,6 +22,7 @@ module pd_layers
                                                 !! all of it
     integer :: shape = 0                        !! shape whose edges these are
     integer :: edge = 0                         !! number of the edge; 0: all of them
+    logical :: mirror = .false.                 !! its points are images of the body
   end type layer_t
 
   real(wp), parameter :: round_off = 1.0e-6_wp
@@ -109,6 +110,72 @@ contains
     end subroutine fill_row
 
   end subroutine fill_layer
+
+  !> Where a layer of images reaches the end of its side it goes on over the layers of the next
+  !> side: what they hold before it has images too.
+  subroutine go_on_over_layers(layer, origin, lattice, places)
+    type(layer_t),   intent(in)    :: layer
+    real(wp),        intent(in)    :: origin(2)   !! of lattice line 0, 0 [m]
+    type(lattice_t), intent(in)    :: lattice
+    type(places_t),  intent(inout) :: places
+    integer :: side, axis, along, step, square, on_line(2), squares(2), ends(2), p, k
+
+    if (.not. layer%mirror .or. layer%shape > 0) return
+    p = lattice%rows
+    do side = 1, side_count
+      if (.not. covers(layer%side, side)) cycle
+      axis = normal_axis(side_names(side))
+      along = 3 - axis
+      step = outward(side_names(side))
+      ends = merge(places%line([left, right]), places%line([bottom, top]), axis == 2)
+      call find_range(layer, origin(along), ends, places%squares(:, along), lattice, on_line, &
+        squares)
+      square = places%line(side) - merge(0, merge(0, 1, lattice%cells), step > 0)
+      do k = 1, p + 1
+        if (on_line(1) == ends(1)) then
+          if (k <= p) call own(k, ends(1) - p, ends(1) - 1)
+          call fill(k, squares(1) - p - 1, squares(1) - 1)
+        end if
+        if (on_line(2) == ends(2)) then
+          if (k <= p) call own(k, ends(2) + 1, ends(2) + p)
+          call fill(k, squares(2) + 1, squares(2) + p + 1)
+        end if
+      end do
+    end do
+
+  contains
+
+    !> Places a to b of line k of the layer, where there is a layer before them.
+    subroutine own(k, a, b)
+      integer, intent(in) :: k, a, b
+
+      associate (line => places%line(side), owner => places%owner)
+        if (axis == 1) then
+          where (owner(line, a:b) > 0 .and. owner(line + step * k, a:b) == empty) &
+            owner(line + step * k, a:b) = layer%boundary
+        else
+          where (owner(a:b, line) > 0 .and. owner(a:b, line + step * k) == empty) &
+            owner(a:b, line + step * k) = layer%boundary
+        end if
+      end associate
+    end subroutine own
+
+    !> Squares a to b of line k.
+    subroutine fill(k, a, b)
+      integer, intent(in) :: k, a, b
+
+      associate (filled => places%filled, whole => places%whole)
+        if (axis == 1) then
+          where (filled(square, a:b)) whole(square + step * k, a:b) = .true.
+          where (filled(square, a:b)) filled(square + step * k, a:b) = .true.
+        else
+          where (filled(a:b, square)) whole(a:b, square + step * k) = .true.
+          where (filled(a:b, square)) filled(a:b, square + step * k) = .true.
+        end if
+      end associate
+    end subroutine fill
+
+  end subroutine go_on_over_layers
 
   !> Whether a layer lies on a whole side.
   pure logical function any_on(layers, side)

@@ -8,7 +8,7 @@ module pd_point_sets
   implicit none
   private
 
-  public :: point_set_t, side_t, boundary_set, columns_of
+  public :: point_set_t, side_t, boundary_set, images_of
 
   type :: point_set_t
     character(:), allocatable :: name
@@ -39,48 +39,39 @@ contains
     set%points = pack([(i, i=1, size(owner))], owner == k)
   end function boundary_set
 
-  !> The columns of the layer of boundary k across its side, each with the point of the body next to
-  !> it first; 0: no point (most in a column, columns). Points without a neighbour are left out.
-  pure function columns_of(owner, place, k, axis, rows) result(columns)
+  !> What the points of a layer are images of, in a plane halfway between the layer and the body:
+  !> for each of them the number of a point of the body, or of another layer beside it; 0: there is
+  !> none.
+  pure function images_of(points, owner, place, axis, rows) result(origin)
+    integer, intent(in) :: points(:)            !! of the layer
     integer, intent(in) :: owner(:)             !! boundary of every point
     integer, intent(in) :: place(:, :)          !! column and row on the lattice (n,2)
-    integer, intent(in) :: k
     integer, intent(in) :: axis                 !! of the normal; 1: x, 2: y
     integer, intent(in) :: rows                 !! of points in the layer
-    integer, allocatable :: columns(:, :), number(:, :)
+    integer :: origin(size(points))
+    integer, allocatable :: number(:, :)
     integer, dimension(2) :: here, high, low
-    integer :: column_at(size(owner)), c, i, j, side
+    integer :: i, j, side
 
-    low = minval(place, 1) - rows
-    high = maxval(place, 1) + rows
+    low = minval(place, 1) - 2 * rows
+    high = maxval(place, 1) + 2 * rows
     allocate (number(low(1):high(1), low(2):high(2)), source=0)
     do i = 1, size(owner)
-      number(place(i, 1), place(i, 2)) = i
+      if (owner(i) /= owner(points(1))) number(place(i, 1), place(i, 2)) = i
     end do
-    column_at = 0
-    c = 0
-    allocate (columns(rows + 1, count(owner == k)), source=0)
-    do i = 1, size(owner)
-      if (owner(i) /= k) cycle
+    origin = 0
+    do i = 1, size(points)
       search: do j = 1, rows
         do side = -1, 1, 2
-          here = place(i, :)
+          here = place(points(i), :)
           here(axis) = here(axis) + side * j
-          associate (n => number(here(1), here(2)))
-            if (n == 0) cycle
-            if (owner(n) /= 0) cycle
-            if (column_at(n) == 0) then
-              c = c + 1
-              column_at(n) = c
-              columns(1, c) = n
-            end if
-            columns(j + 1, column_at(n)) = i
-          end associate
+          if (number(here(1), here(2)) == 0) cycle
+          here(axis) = here(axis) + side * (j - 1)
+          origin(i) = number(here(1), here(2))
           exit search
         end do
       end do search
     end do
-    columns = columns(:, :c)
-  end function columns_of
+  end function images_of
 
 end module pd_point_sets

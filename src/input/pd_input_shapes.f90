@@ -9,7 +9,7 @@ module pd_input_shapes
   implicit none
   private
 
-  public :: outline, find_extents, body_number, axis_of, reaches_side, circle_error
+  public :: outline, find_extents, body_number, axis_of, reaches_side, is_bearing, circle_error
 
   !> How far the polygon of a circle is from it at most [spacings].
   real(wp), parameter :: circle_error = 1.0e-4_wp
@@ -135,5 +135,14 @@ contains
       if (abs(v(axis, e) - line) <= 1.0e-6_wp * maxval(upper - lower)) reaches_side = .true.
     end do
   end function reaches_side
+
+  !> Whether the layers of a boundary are a smooth bearing, the mirror image of the body: they do
+  !> not continue it.
+  pure logical function is_bearing(boundary)
+    type(boundary_input_t), intent(in) :: boundary
+
+    is_bearing = boundary%contact == 'smooth' .and. (size(boundary%span) > 0 &
+      .or. boundary%edge > 0)
+  end function is_bearing
 
 end module pd_input_shapes

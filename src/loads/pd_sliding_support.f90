@@ -1,10 +1,7 @@
-!> Smooth support on a part of a side: rigid across it; along it, its layers follow the body.
+!> Smooth support on a part of a side, or on an edge: its layers are the mirror image of the body.
 !>
-!> A column of the layer and the point of the body next to it move as one along the side:
-!>
-!>   f <- sum V f / sum V          over the points of the column, along the side
-!>
-!> This projection does no work. A layer that were free along the side would shear.
+!> The plane between the two moves along its normal. The layers follow (`pd_mirror`), twice as far:
+!> the reaction of the plane is twice theirs. None of their components is free.
 !> Source: doc/theory.md, section 7.
 module pd_sliding_support
   use pd_kinds, only: wp
@@ -17,45 +14,51 @@ module pd_sliding_support
   public :: sliding_support_t, new_sliding_support
 
   type, extends(rigid_support_t) :: sliding_support_t
-    integer, private :: along = 0                      !! axis along the side; 1: x, 2: y
-    integer, allocatable, private :: columns(:, :)     !! points that move as one, 0: none
-                                                       !! (most in a column, columns)
   contains
-    procedure :: share_forces
+    procedure :: mark_prescribed
+    procedure :: prescribe
+    procedure :: take_reactions
   end type sliding_support_t
 
 contains
 
-  !> Support that moves its points across a side, whose columns follow the body along it.
-  pure type(sliding_support_t) function new_sliding_support(set, axis, velocity, mass, columns) &
+  !> Support that moves the plane of its points along its normal.
+  pure type(sliding_support_t) function new_sliding_support(set, axis, velocity, mass) &
     result(support)
     type(point_set_t), intent(in) :: set
     integer,           intent(in) :: axis              !! of the normal; 1: x, 2: y
     type(table_t),     intent(in) :: velocity(2)       !! x, y [m/s]
     real(wp),          intent(in) :: mass(:)           !! rho V of all points (n) [kg/m]
-    integer,           intent(in) :: columns(:, :)     !! of points, 0: none
 
     support%rigid_support_t = new_rigid_support(set, [1, 2] == axis, velocity, mass)
-    support%along = 3 - axis
-    allocate (support%columns(size(columns, 1), size(columns, 2)), source=columns)
   end function new_sliding_support
 
-  pure subroutine share_forces(self, volume, t, f)
+  pure subroutine mark_prescribed(self, free)
     class(sliding_support_t), intent(in)    :: self
-    real(wp),                 intent(in)    :: volume(:), t
-    real(wp),                 intent(inout) :: f(:, :)
-    real(wp) :: force, whole
-    integer  :: k
+    real(wp),                 intent(inout) :: free(:, :)
 
-    associate (unused => t)
-    end associate
-    do k = 1, size(self%columns, 2)
-      associate (points => pack(self%columns(:, k), self%columns(:, k) > 0))
-        force = sum(volume(points) * f(points, self%along))
-        whole = sum(volume(points))
-        f(points, self%along) = force / whole
-      end associate
-    end do
-  end subroutine share_forces
+    free(self%points, :) = 0.0_wp
+  end subroutine mark_prescribed
+
+  !> The velocity of the plane; where the images are follows from the body.
+  pure subroutine prescribe(self, t, u, v)
+    class(sliding_support_t), intent(in)    :: self
+    real(wp),                 intent(in)    :: t
+    real(wp),                 intent(inout) :: u(:, :), v(:, :)
+    real(wp) :: kept(size(self%points), 2)
+
+    kept = u(self%points, :)
+    call self%rigid_support_t%prescribe(t, u, v)
+    u(self%points, :) = kept
+  end subroutine prescribe
+
+  !> - 2 sum V f along the normal.
+  pure subroutine take_reactions(self, volume, t, f)
+    class(sliding_support_t), intent(inout) :: self
+    real(wp),                 intent(in)    :: volume(:), t, f(:, :)
+
+    call self%rigid_support_t%take_reactions(volume, t, f)
+    self%force = 2.0_wp * self%force
+  end subroutine take_reactions
 
 end module pd_sliding_support

@@ -1,9 +1,6 @@
-!> A sliding bearing: it carries stress across itself, and no other.
+!> The law of layers that are images of the body: they have no stress and no energy of their own.
 !>
-!>   S_aa = (lambda + 2 G) E_aa along the axis a of its normal, all other components 0
-!>
-!> Layers of a smooth boundary on a part of a side are made of it: soil in their place would shear
-!> where the body slides out below it, and flow.
+!> Their force tensors are those of the body, reflected (`pd_mirror`).
 !> Source: doc/theory.md, section 7.
 module pd_bearing
   use pd_flow, only: flow_t
@@ -16,7 +13,6 @@ module pd_bearing
   public :: bearing_t, new_bearing
 
   type, extends(law_t) :: bearing_t
-    integer :: axis = 0                  !! of the normal; 1: x, 2: y
     real(wp), private :: lambda = 0.0_wp          !! of the material in whose place it is [Pa]
     real(wp), private :: shear_modulus = 0.0_wp   !! [Pa]
   contains
@@ -31,11 +27,9 @@ module pd_bearing
 contains
 
   !> The bearing in place of a material.
-  pure type(bearing_t) function new_bearing(axis, material) result(law)
-    integer,      intent(in) :: axis
+  pure type(bearing_t) function new_bearing(material) result(law)
     class(law_t), intent(in) :: material
 
-    law%axis = axis
     call material%lame_constants(law%lambda, law%shear_modulus)
   end function new_bearing
 
@@ -46,7 +40,7 @@ contains
     allocate (columns(0))
   end function remembers
 
-  !> Stress of rows lo to hi.
+  !> None.
   pure subroutine stress_block(self, first, lo, hi, strain, points, flow)
     class(bearing_t), intent(in) :: self
     integer,  intent(in) :: first, lo, hi
@@ -54,21 +48,22 @@ contains
     type(law_points_t), intent(inout) :: points
     type(flow_t), intent(inout) :: flow
 
+    associate (unused => self, unused_first => first, unused_strain => strain)
+    end associate
     flow%n = 0
     points%stress(lo:hi, :) = 0.0_wp
-    points%stress(lo:hi, self%axis) = (self%lambda + 2.0_wp * self%shear_modulus) &
-      * strain(lo - first + 1:hi - first + 1, self%axis)
   end subroutine stress_block
 
-  !> Stored elastic energy of rows lo to hi.
+  !> None.
   pure subroutine energy_block(self, first, lo, hi, points, energy)
     class(bearing_t), intent(in) :: self
     integer,  intent(in) :: first, lo, hi
     type(law_points_t), intent(in) :: points
     real(wp), intent(inout), contiguous :: energy(:)   !! out: [J/m^3]; row 1 is row `first`
 
-    energy(lo - first + 1:hi - first + 1) = 0.5_wp * points%stress(lo:hi, self%axis)**2 &
-      / (self%lambda + 2.0_wp * self%shear_modulus)
+    associate (unused => self, unused_points => points)
+    end associate
+    energy(lo - first + 1:hi - first + 1) = 0.0_wp
   end subroutine energy_block
 
   !> No flow, no heat.

@@ -8,7 +8,7 @@ module pd_forces
   use pd_flow, only: flow_t
   use pd_kinds, only: n_block, wp
   use pd_materials, only: materials_t
-  use pd_model, only: model_t
+  use pd_model, only: model_t, move_planes
   use pd_operators, only: operators_t
   use pd_state, only: block_work_t, state_t
   use pd_timing, only: kernel_boundaries, kernel_force, kernel_gradient, now, timing_t
@@ -38,6 +38,7 @@ contains
     type(timing_t),     intent(inout) :: timing
     integer,            intent(out)   :: failed_row
 
+    call move_planes(model, t)
     associate (points => model%points)
       call internal_forces(model%operators, model%materials, points%volume, state, work, timing, &
         failed_row)
@@ -61,7 +62,7 @@ contains
 
     n_blocks = operators%domain%blocks%count
     call work%fit(operators%domain%blocks)
-    call operators%take_in(state%displacement)
+    call operators%take_in(state%displacement, operators%mirror%place)
     !$omp parallel do schedule(static) default(none) private(block) &
     !$omp shared(n_blocks, operators, materials, volume, state, work, timing)
     do block = 1, n_blocks
@@ -78,6 +79,7 @@ contains
         operators%domain%blocks%hi(block), state%displacement, state%force)
     end do
     !$omp end parallel do
+    call operators%mirror%hand_back(state%force)
     call timing%lap(kernel_force)
   end subroutine internal_forces
 
@@ -146,7 +148,7 @@ contains
 
     n_blocks = operators%domain%blocks%count
     allocate (next%h(operators%n, 4), next%p(operators%n, 4), source=0.0_wp)
-    call operators%take_in(state%velocity)
+    call operators%take_in(state%velocity, operators%mirror%rate)
     !$omp parallel do schedule(static) default(none) private(block, lo, hi, p) &
     !$omp shared(n_blocks, operators, materials, time_step, state, next)
     do block = 1, n_blocks
@@ -205,6 +207,7 @@ contains
         operators%domain%blocks%hi(block), u, f)
     end do
     !$omp end parallel do
+    call operators%mirror%hand_back(f)
   end subroutine linear_forces
 
 end module pd_forces

@@ -14,7 +14,7 @@ module pd_increment
   use pd_forces, only: forces
   use pd_kinds, only: wp
   use pd_ledger, only: ledger_t
-  use pd_model, only: model_t
+  use pd_model, only: model_t, move_planes
   use pd_relaxation, only: keep_start, relax, relaxation_t, relaxed_t, new_relaxation, &
     return_to_start
   use pd_schedule, only: schedule_t
@@ -126,13 +126,20 @@ contains
 
   !> First guess of the next equilibrium: the motion goes on.
   subroutine guess(model, t, duration, relaxation, state)
-    type(model_t),      intent(in)    :: model
+    type(model_t),      intent(inout) :: model         !! its planes of mirrors move
     real(wp),           intent(in)    :: t, duration   !! [s]
     type(relaxation_t), intent(in)    :: relaxation
     type(state_t),      intent(inout) :: state
+    real(wp), allocatable :: place(:)
 
     state%displacement = relaxation%displacement + duration * model%points%free * state%velocity
     call model%supports%prescribe(t + duration, state%displacement, state%velocity)
+    associate (mirror => model%operators%mirror)
+      if (mirror%n == 0) return
+      allocate (place, source=mirror%place)
+      call move_planes(model, t + duration)
+      call mirror%carry(mirror%place - place, state%displacement)
+    end associate
   end subroutine guess
 
   !> The increment is over: stress and history go on from its start, once; so do the supports.

@@ -34,7 +34,7 @@ contains
 
     call prepare_next_step(model%operators, model%materials, time_step, state, next)
     call highest_frequency(model, frequency, iterations, state, next)
-    call model%operators%take_in(state%displacement)
+    call model%operators%take_in(state%displacement, model%operators%mirror%place)
   end function frequency_of_state
 
   !> How much the highest frequency of an elastic body may have risen by its deformation: the square

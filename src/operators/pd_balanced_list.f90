@@ -85,12 +85,13 @@ contains
   end subroutine residual
 
   !> Make u readable for the sums, and for the control find c H^0.
-  subroutine take_in(self, u)
+  subroutine take_in(self, u, moved)
     class(balanced_list_t), intent(inout) :: self
     real(wp), intent(inout), contiguous :: u(:, :)   !! (n,2) [m]; its halo is brought up to date
+    real(wp), intent(in), optional :: moved(:)       !! see operators_t
     integer :: block, lo, hi, k
 
-    call self%bond_list_t%take_in(u)
+    call self%bond_list_t%take_in(u, moved)
     if (.not. allocated(self%control)) return
     if (.not. allocated(self%affine)) allocate (self%affine(self%n, 4))
     !$omp parallel do schedule(static) default(none) shared(self, u) private(block, lo, hi, k)

@@ -12,7 +12,7 @@
 !>
 !> In this order, once per state of u:
 !>
-!>   take_in(u)                          the sums can read u
+!>   take_in(u, moved)                   the sums can read u
 !>   gradient_block(lo, hi, u, h)        for every block
 !>   relax_block(block, u, h, ..., p)    for every block; the relaxing control joins P
 !>   hand_over_block(lo, hi, h, p)       for every block; takes P, keeps A
@@ -29,6 +29,7 @@ module pd_operators
   use pd_domain, only: domain_t
   use pd_flow, only: flow_t
   use pd_kinds, only: block_sum, i8, n_block, pi, wp
+  use pd_mirror, only: mirror_t
   use pd_operator_rows, only: mean_displacement, stress_times_k_inverse, subtract_affine_control, &
     times_k_inverse
   use pd_relaxing, only: relaxing_t, springs_t
@@ -43,6 +44,7 @@ module pd_operators
     integer :: n = 0                                      !! rows of the fields
     type(storage_t) :: storage                            !! row of every point
     type(domain_t)  :: domain                             !! blocks of rows
+    type(mirror_t)  :: mirror                             !! layers that are images of the body
     real(wp), allocatable :: weight_sum(:)                !! W_i = sum_j omega V_j (n) [m^2]
     real(wp), allocatable :: k_inverse(:, :)              !! K^-1 (n,3) xx yy xy [1/m^4]
     real(wp), allocatable :: control(:)                   !! c (n) [N/m^6]; not allocated: none
@@ -155,11 +157,13 @@ module pd_operators
 
 contains
 
-  !> Make u readable for the sums.
-  subroutine take_in(self, u)
+  !> Make u readable for the sums. `moved`: what the planes of mirrors do, absent: nothing.
+  subroutine take_in(self, u, moved)
     class(operators_t), intent(inout) :: self
     real(wp), intent(inout), contiguous :: u(:, :)   !! (n,2) [m]; its halo is brought up to date
+    real(wp), intent(in), optional :: moved(:)       !! along their normals (planes) [m]
 
+    call self%mirror%reflect_motion(u, moved)
     call self%domain%halo%exchange(u)
     call self%weigh_in(u)
     if (.not. allocated(self%force_tensor)) &

@@ -60,15 +60,22 @@ contains
       'equivalent plastic strain at the probe '//name, value=probe_plastic_strain, probe=k)]
   end subroutine add_probe
 
-  !> Mean over the points, weighted with their volumes; 0 for a boundary without points.
+  !> Mean over the points, weighted with their volumes; 0 for a boundary without points. Where they
+  !> are images of the body, that of the plane between.
   pure real(wp) function boundary_displacement(row) result(value)
     type(row_view_t), intent(in) :: row
+    integer :: plane
 
     value = 0.0_wp
     associate (points => row%model%supports%items(row%boundary)%support%points, &
       volume => row%model%points%volume)
       if (size(points) > 0) value = sum(volume(points) &
         * row%state%displacement(points, row%component)) / sum(volume(points))
+    end associate
+    associate (mirror => row%model%operators%mirror)
+      plane = mirror%moves_with(row%boundary)
+      if (plane == 0) return
+      if (mirror%normal(plane) == row%component) value = mirror%place(plane)
     end associate
   end function boundary_displacement
 

@@ -4,7 +4,7 @@ module pd_setup_body
   use pd_errors, only: error_list_t
   use pd_geometry, only: body_t, lattice_t, layer_t, nearest_count, region_body, shape_t
   use pd_input, only: resolved_path
-  use pd_input_shapes, only: body_number, circle_error, find_extents, outline
+  use pd_input_shapes, only: body_number, circle_error, find_extents, is_bearing, outline
   use pd_input_types, only: body_input_t, input_t
   use pd_kinds, only: is_set, wp
   use pd_random_field, only: longest_way
@@ -163,6 +163,7 @@ contains
       layers(k)%shape = body_number(input, input%boundaries(k)%body)
       layers(k)%edge = input%boundaries(k)%edge
       if (size(input%boundaries(k)%span) == 2) layers(k)%span = input%boundaries(k)%span
+      layers(k)%mirror = is_bearing(input%boundaries(k))
     end do
     call region_body(shapes, origin, lattice, layers, body, errors)
     if (adjusted .and. errors%count() == 0) then

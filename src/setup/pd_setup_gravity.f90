@@ -3,10 +3,10 @@
 !> Source: doc/theory.md, section 7.
 module pd_setup_gravity
   use pd_body_force, only: new_body_force
+  use pd_input_shapes, only: is_bearing
   use pd_input_types, only: input_t
   use pd_kinds, only: wp
   use pd_model, only: model_t
-  use pd_setup_materials, only: is_bearing
   use pd_setup_surface, only: taken
   use pd_text, only: short_number
   implicit none

@@ -5,17 +5,16 @@
 module pd_setup_loads
   use pd_affine_support, only: new_affine_support
   use pd_errors, only: error_list_t
-  use pd_input_shapes, only: body_number
+  use pd_input_shapes, only: body_number, is_bearing
   use pd_input_types, only: boundary_input_t, input_t, pressure_input_t
   use pd_kinds, only: wp
   use pd_loaded_platen, only: new_loaded_platen
   use pd_loads, only: load_t
   use pd_model, only: model_t
   use pd_platens, only: new_platens
-  use pd_point_sets, only: boundary_set, columns_of, point_set_t, side_t
+  use pd_point_sets, only: boundary_set, point_set_t, side_t
   use pd_pressure, only: new_pressure, pressure_t, spread_on_edges, spread_on_side, surface_t
   use pd_rigid_support, only: new_rigid_support
-  use pd_setup_materials, only: is_bearing
   use pd_setup_surface, only: edges_of, find_surface, taken
   use pd_sides, only: normal_axis, side_number
   use pd_sliding_support, only: new_sliding_support
@@ -77,8 +76,6 @@ contains
     type(model_t), intent(in) :: model
     class(support_t), allocatable, intent(out) :: support
     type(point_set_t) :: set
-    integer, allocatable :: columns(:, :)
-    integer :: c
     type(table_t) :: motion(3)
 
     associate (b => given(k), body => model%body)
@@ -95,13 +92,7 @@ contains
           loaded_lengths(given, body%sides(side_number(b%side)), body%boundary), b%ramp_time, &
           since))
       else if (is_bearing(b)) then
-        columns = columns_of(body%boundary, body%place, k, b%axis, &
-          ceiling(model%delta / model%spacing - 1.0e-6_wp))
-        do c = 1, size(columns, 2)
-          where (columns(:, c) > 0) &
-            columns(:, c) = model%operators%storage%row(max(1, columns(:, c)))
-        end do
-        allocate (support, source=new_sliding_support(set, b%axis, motion(:2), mass, columns))
+        allocate (support, source=new_sliding_support(set, b%axis, motion(:2), mass))
       else
         allocate (support, source=new_rigid_support(set, taken(b), motion(:2), mass))
       end if

@@ -7,6 +7,7 @@ module pd_setup_materials
   use pd_errors, only: error_list_t
   use pd_families, only: horizon_t
   use pd_green_lagrange, only: green_lagrange_t
+  use pd_input_shapes, only: is_bearing
   use pd_input_types, only: boundary_input_t, input_t, material_input_t, &
     stabilisation_input_t
   use pd_j2, only: new_j2
@@ -25,7 +26,7 @@ module pd_setup_materials
   implicit none
   private
 
-  public :: set_up_points, set_up_materials, set_up_relaxing_control, is_bearing
+  public :: set_up_points, set_up_materials, set_up_relaxing_control
 
 contains
 
@@ -102,21 +103,12 @@ contains
         list(n + 1) = list(j)
         list(n + 1)%youngs_modulus = 0.0_wp   ! no control: what does not flow would never let it go
         deallocate (list(n + 1)%law)
-        allocate (list(n + 1)%law, source=new_bearing(input%boundaries(k)%axis, list(j)%law))
+        allocate (list(n + 1)%law, source=new_bearing(list(j)%law))
         call move_alloc(list, model%materials%list)
         where (here) law_of = n + 1
       end do
     end do
   end subroutine set_up_bearings
-
-  !> Whether the layers of a boundary only carry stress across themselves: they do not continue the
-  !> body.
-  pure logical function is_bearing(boundary)
-    type(boundary_input_t), intent(in) :: boundary
-
-    is_bearing = boundary%contact == 'smooth' .and. (size(boundary%span) > 0 &
-      .or. boundary%edge > 0)
-  end function is_bearing
 
   !> The law of a material.
   pure function new_law(given) result(law)

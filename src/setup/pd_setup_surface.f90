@@ -4,13 +4,12 @@
 module pd_setup_surface
   use pd_edge_weights, only: find_edge_weights
   use pd_edges, only: bare_edges, edge_t, material_t, outline_edges, rim_edges
-  use pd_input_shapes, only: outline
+  use pd_input_shapes, only: is_bearing, outline
   use pd_input_types, only: boundary_input_t, input_t
   use pd_kinds, only: wp
   use pd_model, only: model_t
   use pd_polygons, only: inside
   use pd_pressure, only: surface_t, surface_vectors
-  use pd_setup_materials, only: is_bearing
   use pd_stages, only: stage_t
   implicit none
   private

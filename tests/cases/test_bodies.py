@@ -58,23 +58,26 @@ def test_energies_balance_with_contacts_on_edges(fields):
     assert rows["footing_force_y"][-1] < 0.0
 
 
-def test_layers_of_a_smooth_edge_neither_flow_nor_shear(fields):
-    found, _ = fields(POLYGON)
+def test_layers_of_a_smooth_edge_are_the_image_of_the_body(fields):
+    found, rows = fields(POLYGON)
     layer = np.flatnonzero(found["boundary"] == 2)
     assert len(layer) > 20
     assert not found["plastic_strain"][layer].any()
-    # only stress across the side, but for the rotation of the points
-    across = np.abs(found["stress"][layer, 1]).max()
-    assert across > 5.0e3
-    assert np.abs(found["stress"][layer][:, [0, 2, 3]]).max() < 0.02 * across
-    # a column moves along the side as the point of the body next to it
+    assert not found["stress"][layer].any()
     body = np.flatnonzero(found["boundary"] == 0)
-    for i in layer:
-        x, y = found["position"][i]
-        near = body[np.abs(found["position"][body] - [x, 1.2]).max(axis=1) < 1e-6]
-        assert len(near) == 1
-        assert y > 1.2
-        assert found["displacement"][i, 0] == pytest.approx(found["displacement"][near[0], 0])
+    far = (found["position"][layer, 1] - found["position"][layer, 1].min()) / 0.1
+    first = found["position"][body, 1][
+        np.abs(found["position"][body, 1] - found["position"][layer, 1].min()) < 0.15
+    ].max()
+    for i, k in zip(layer, np.rint(far), strict=True):
+        x, _ = found["position"][i]
+        there = np.abs(found["position"][body] - [x, first - 0.1 * k]).max(axis=1) < 1e-6
+        assert there.sum() == 1
+        origin = body[there][0]
+        assert found["displacement"][i, 0] == found["displacement"][origin, 0]
+        assert found["displacement"][i, 1] + found["displacement"][origin, 1] == pytest.approx(
+            2.0 * rows["footing_displacement_y"][-1]
+        )
 
 
 FOOTING = """\
@@ -91,17 +94,6 @@ FOOTING = """\
 &integration method = 'equilibrium', end_time = 3.0, increments = 10, residual = 1.0e-3 /
 &output history_count = 10, frame_count = 1 /
 """
-
-
-def test_a_smooth_footing_has_prandtls_limit_load(fields):
-    """(2 + pi) c B: ten points in its width leave 4 %; with layers of soil it was 8 % below."""
-    found, rows = fields(FOOTING)
-    assert -rows["footing_force_y"][-1] / 10.0e3 == pytest.approx(2.0 + np.pi, rel=0.05)
-    # the soil slides out below it on both sides
-    under = (found["boundary"] == 0) & (found["position"][:, 1] > -0.06)
-    under &= np.abs(found["position"][:, 0]) < 0.5
-    side = np.sign(found["position"][under, 0])
-    assert np.mean(side * found["displacement"][under, 0]) > 0.3 * 0.03
 
 
 def test_a_polygon_of_four_corners_is_the_rectangle(fields):

@@ -96,6 +96,12 @@ def settled(boundary: str, axis: float = 1.0) -> Callable[[Run], float]:
     return measure
 
 
+def of_half(boundary: str) -> Callable[[Run], float]:
+    """The same where the body is one half of a symmetric one."""
+    half = settled(boundary)
+    return lambda run: 2.0 * half(run)
+
+
 def weight_at_collapse(run: Run) -> float:
     """Unit weight of the last equilibrium, times the height of 1 m, over c."""
     if "limit load:" not in run.path.with_suffix(".log").read_text(encoding="utf-8"):
@@ -189,8 +195,10 @@ def rims() -> Lines:
 # ---------------------------------------------------------------------------------------- cases
 
 FOOTING = (("B/10", 0.1), ("B/20", 0.05), ("B/40", 0.025))
+FINE = (("B/40", 0.025), ("B/80", 0.0125), ("B/160", 0.00625))
 HEIGHT = (("h/10", 0.1), ("h/20", 0.05), ("h/40", 0.025))
 AROUND = (-2.5, 2.5, -1.6, 0.3)
+BESIDE_AXIS = (0.0, 1.5, -0.8, 0.1)
 EQUILIBRIUM = ("integration.method=equilibrium", "integration.damping=")
 PRANDTL = (2.0 + np.pi) * C / 1e3
 ROUGH, SMOOTH = (exact.footing(4.0, rough) * C / 1e3 for rough in (True, False))
@@ -228,23 +236,25 @@ CASES: dict[str, Case] = {
     "smooth_footing": Case(
         "Smooth strip footing",
         "kN/m",
-        (Variant("", "smooth_footing", settled("footing"), PRANDTL, PRANDTL, 1.5e-2),),
-        FOOTING,
+        (Variant("", "smooth_footing", of_half("footing"), PRANDTL, PRANDTL, 1.5e-2),),
+        FINE,
         hill,
         "Hill",
-        AROUND,
+        BESIDE_AXIS,
     ),
-    "growing_strength": Case(
-        "Strip footing, strength grows with depth, k B / c0 = 4",
+    "growing_strength_rough": Case(
+        "Rough footing, strength grows with depth, k B / c0 = 4",
         "kN/m",
-        (
-            Variant("rough", "growing_strength_rough", settled("footing"), ROUGH, ROUGH, 3.0e-2),
-            Variant(
-                "smooth", "growing_strength_smooth", settled("footing"), SMOOTH, SMOOTH, 3.0e-2
-            ),
-        ),
-        FOOTING,
-        box=AROUND,
+        (Variant("", "growing_strength_rough", of_half("footing"), ROUGH, ROUGH, 3.0e-2),),
+        (("B/20", 0.05), ("B/40", 0.025), ("B/80", 0.0125)),
+        box=BESIDE_AXIS,
+    ),
+    "growing_strength_smooth": Case(
+        "Smooth footing, strength grows with depth, k B / c0 = 4",
+        "kN/m",
+        (Variant("", "growing_strength_smooth", of_half("footing"), SMOOTH, SMOOTH, 3.0e-2),),
+        FINE,
+        box=BESIDE_AXIS,
     ),
     "vertical_cut": Case(
         "Vertical cut, gamma h / c",
