@@ -23,7 +23,15 @@ from perigeo_post import OutputError, RequestError, ResultError
 from perigeo_post.cli.command_line import main
 from perigeo_post.report.check import LARGE, check_report, check_text
 from perigeo_post.report.publish import BEGIN, END, publish, tables
-from perigeo_post.report.values import HEADLINE, QUALITY, column_text, duration, number, prefixed
+from perigeo_post.report.values import (
+    HEADLINE,
+    QUALITY,
+    column_text,
+    duration,
+    number,
+    prefixed,
+    readable,
+)
 from perigeo_post.report.write import gather, write_report
 from perigeo_post.study.measures import MEASURES
 
@@ -207,6 +215,11 @@ def change(folder: Path, **changes: Any) -> None:
 
 
 # ---- the page ------------------------------------------------------------------------------------
+
+
+def test_a_column_that_ends_in_a_strain_is_measured_at_it():
+    assert readable("band_ratio_1_3") == "band ratio at 1.3 %"
+    assert readable("largest_alpha") == "largest alpha"
 
 
 def test_page_needs_nothing_outside_itself(results: Path) -> None:

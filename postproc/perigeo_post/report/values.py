@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -125,8 +126,9 @@ def plural(count: int, word: str) -> str:
 
 
 def readable(column: str) -> str:
-    """The name of a column as words."""
-    return column.replace("_", " ")
+    """The name of a column as words; what ends in a strain is measured at it."""
+    at_strain = re.sub(r"_(\d)_(\d)$", r" at \1.\2 %", column)
+    return at_strain.replace("_", " ")
 
 
 def line_of(column: str, study: Study, rows: Sequence[Mapping[str, Value]]) -> Line:
