@@ -9,7 +9,7 @@ from case_files import SPECIMEN
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCUMENTS = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "doc").glob("*.md"))]
-DOCUMENTS.append(ROOT / "postproc" / "README.md")
+DOCUMENTS += [*sorted((ROOT / "doc" / "tutorials").glob("*.md")), ROOT / "postproc" / "README.md"]
 OF_THE_READER = {"input/my_case.nml"}  # the case that the README has its reader make
 FOLDERS = "src|doc|input|tests|tools|postproc"
 
