@@ -99,3 +99,10 @@ def test_the_commands_of_a_page_run_in_an_empty_folder(
         said += capsys.readouterr().out
         assert all(Path(words[k + 1]).is_file() for k, word in enumerate(words) if word == "-o")
     assert not [text for text in SAID.get(name, ()) if text not in said]
+
+
+@pytest.mark.parametrize("path", sorted(SHIPPED.glob("*.nml")), ids=lambda path: path.stem)
+def test_every_input_of_limit_loads_is_right(path, perigeo, tmp_path):
+    done = perigeo(["--check", path], tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "the input is right" in done.stdout
