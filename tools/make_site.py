@@ -30,6 +30,7 @@ PAGES = {
     "doc/tutorials/excavation.md": "tutorial_excavation",
     "doc/tutorials/hole.md": "tutorial_hole",
     "doc/model.md": "model",
+    "doc/choices.md": "choices",
     "doc/studies.md": "studies",
     "doc/results.md": "results",
     "doc/theory.md": "theory",

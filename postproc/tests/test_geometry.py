@@ -61,6 +61,14 @@ def test_the_figure_names_materials_boundaries_and_loads(points, tmp_path):
     assert save_figure(figure, tmp_path / "body.png").stat().st_size > 5000
 
 
+def test_the_labels_of_the_axes_are_not_cut(points):
+    tall = "".join(f"point 0.0 {y} 0.0025 clay -\n" for y in np.arange(0.0, 2.13, 0.05))
+    wide = "".join(f"point {x} 0.0 0.0025 clay base\n" for x in np.arange(0.05, 2.13, 0.05))
+    figure = geometry_figure(read_points_file(points(TEXT.splitlines()[0] + "\n" + tall + wide)))
+    figure.draw_without_rendering()
+    assert figure.axes[0].yaxis.label.get_window_extent().x0 > 0.0
+
+
 @pytest.mark.parametrize(
     ("text", "error", "part"),
     [

@@ -9,7 +9,7 @@ from case_files import SPECIMEN
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCUMENTS = [*sorted(ROOT.glob("*.md")), *sorted((ROOT / "doc").glob("*.md"))]
-DOCUMENTS.append(ROOT / "postproc" / "README.md")
+DOCUMENTS += [*sorted((ROOT / "doc" / "tutorials").glob("*.md")), ROOT / "postproc" / "README.md"]
 OF_THE_READER = {"input/my_case.nml"}  # the case that the README has its reader make
 FOLDERS = "src|doc|input|tests|tools|postproc"
 
@@ -115,7 +115,21 @@ def test_the_version_to_cite_is_the_version():
     assert f"\n## {version}\n" in (ROOT / "CHANGELOG.md").read_text()
 
 
-def test_the_picture_of_the_readme_is_small():
+def test_every_picture_of_the_gallery_has_an_input_or_command():
+    gallery = (ROOT / "README.md").read_text().partition("\n## Gallery\n")[2].partition("\n## ")[0]
+    rows = [re.split(r" *\| *", line)[1:-1] for line in gallery.splitlines() if line[:1] == "|"]
+    assert len(rows) > 4
+    cases = (ROOT / "tests" / "verify" / "limit_cases.py").read_text()
+    for pictures, texts in zip(rows[2::2], rows[3::2]):
+        assert all("](doc/figures/" in cell for cell in pictures)
+        for text in texts:
+            assert re.search(r"`make |`\.venv/bin/", text), text
+            assert all(
+                f'"{case}": Case(' in cases for case in re.findall(r"limits\.py (\w+)", text)
+            )
+
+
+def test_pictures_are_small():
     sizes = {path.name: path.stat().st_size for path in (ROOT / "doc" / "figures").glob("*")}
     assert sizes
     assert max(sizes.values()) < 150_000, sizes

@@ -7,10 +7,12 @@ import re
 import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 import h5py
 import numpy as np
+from cylinder_radius import exact_radius, radius_at
 from perigeo_post import PostError, Run
 from perigeo_post.measure.limit_load import limit_load
 from verify import ROOT
@@ -35,6 +37,8 @@ class Variant:
     high: float | None
     tolerance: float  # of the finest grid
     settings: tuple[str, ...] = ()
+    unit: str = ""  # absent: that of the case
+    also: tuple[Variant, ...] = ()  # what else is measured in the same runs
 
 
 @dataclass(frozen=True)
@@ -202,6 +206,16 @@ BESIDE_AXIS = (0.0, 1.5, -0.8, 0.1)
 EQUILIBRIUM = ("integration.method=equilibrium", "integration.damping=")
 PRANDTL = (2.0 + np.pi) * C / 1e3
 ROUGH, SMOOTH = (exact.footing(4.0, rough) * C / 1e3 for rough in (True, False))
+RADIUS = exact_radius(12.0, C / 1e3)
+CYLINDER_RADIUS = Variant(
+    "radius of the plastic part at 12 kPa",
+    "cylinder",
+    partial(radius_at, 12.0),
+    RADIUS,
+    RADIUS,
+    3.0e-2,
+    unit="m",
+)
 
 
 CASES: dict[str, Case] = {
@@ -317,6 +331,8 @@ CASES: dict[str, Case] = {
                 2.0 * C * np.log(2.0) / 1e3,
                 2.0 * C * np.log(2.0) / 1e3,
                 3.0e-2,
+                ("output.frame_count=50",),
+                also=(CYLINDER_RADIUS,),
             ),
         ),
         (("a/10", 0.1), ("a/20", 0.05), ("a/40", 0.025)),

@@ -25,7 +25,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from limit_cases import CASES, Found, Variant
+from cylinder_radius import radius_figure
+from limit_cases import CASES, CYLINDER_RADIUS, C, Found, Variant
 from matplotlib.figure import Figure
 from perigeo_post import PostError, Run
 from perigeo_post.draw.style import new_figure, style
@@ -37,8 +38,8 @@ PAGE = ROOT / "doc" / "verification.md"
 MARKS = "<!-- limit_loads: begin -->", "<!-- limit_loads: end -->"
 
 
-def carry_out(case: str, variant: Variant, grid: int) -> Found:
-    """One run."""
+def carry_out(case: str, variant: Variant, grid: int) -> list[Found]:
+    """One run, and what is measured in it."""
     about = CASES[case]
     label, spacing = about.grids[grid]
     name = f"{variant.input}_{grid}" + ("_none" if variant.title == "no control" else "")
@@ -58,16 +59,11 @@ def carry_out(case: str, variant: Variant, grid: int) -> Found:
     run = execute(name, folder, [*command, str(path)])
     log = run.path.with_suffix(".log").read_text(encoding="utf-8")
     seconds = float(re.findall(r"^time loop +(\S+) s", log, re.MULTILINE)[-1])
-    return Found(
-        about,
-        variant,
-        label,
-        len(run.positions),
-        seconds,
-        variant.measure(run),
-        grid == len(about.grids) - 1,
-        run.path,
-    )
+    finest = grid == len(about.grids) - 1
+    return [
+        Found(about, one, label, len(run.positions), seconds, one.measure(run), finest, run.path)
+        for one in (variant, *variant.also)
+    ]
 
 
 def draw(found: Found) -> Figure:
@@ -137,6 +133,7 @@ def table(rows: list[Found]) -> list[list[str]]:
         known = "other grids"
         if low is not None:
             known = f"{low:.4g}" if high == low else f"{low:.4g} to {high:.4g}"
+        unit = row.variant.unit or row.case.unit
         title = row.case.title + (f", {row.variant.title}" if row.variant.title else "")
         verdict = ("holds" if row.holds else "does not hold") if row.finest else ""
         error = "" if not np.isfinite(row.error) else f"{100.0 * row.error:+.2f} %"
@@ -146,7 +143,7 @@ def table(rows: list[Found]) -> list[list[str]]:
                 row.grid,
                 str(row.points),
                 f"{row.seconds:.0f} s",
-                f"{row.value:.4g} {row.case.unit if row.case.unit != '1' else ''}".strip(),
+                f"{row.value:.4g} {unit if unit != '1' else ''}".strip(),
                 known,
                 error,
                 verdict,
@@ -215,7 +212,7 @@ def main() -> int:
                     jobs.append((name, variant, grid, pool.submit(carry_out, name, variant, grid)))
         for name, variant, grid, job in jobs:
             try:
-                rows.append(job.result())
+                rows.extend(job.result())
             except (PostError, RuntimeError, KeyError) as problem:
                 case = CASES[name]
                 what = ", ".join(filter(None, (case.title, variant.title, case.grids[grid][0])))
@@ -232,6 +229,9 @@ def main() -> int:
     pictures = [RESULTS / f"{name}.png" for name in shown]
     for row, picture in zip(shown.values(), pictures):
         draw(row).savefig(picture, dpi=110)
+    if cylinders := [row for row in rows if row.variant is CYLINDER_RADIUS]:
+        pictures.append(RESULTS / "cylinder_radius.png")
+        radius_figure(cylinders, C / 1e3).savefig(pictures[-1], dpi=110)
     if not options.cases and not options.quick:
         write(rows, failures)
         if options.publish:

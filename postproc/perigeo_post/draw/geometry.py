@@ -27,7 +27,8 @@ def geometry_figure(model: ModelPoints, title: str = "") -> Figure:
     wide = DOUBLE - BESIDE - 20.0
     height = min(MAX_HEIGHT, max(55.0, wide * (high[1] - low[1]) / (high[0] - low[0]) + 20.0))
     with style():
-        figure = new_figure(DOUBLE, height)
+        # for axes of one scale: others are laid out before their ticks are known, and labels cut
+        figure = new_figure(DOUBLE, height, "compressed")
         axes = figure.add_subplot()
         entries = _draw_points(axes, model, wide * MM * 72.0 / (high[0] - low[0]))
         for kind, draw in THINGS.items():
