@@ -10,7 +10,7 @@ module pd_run_steps
     save_checkpoint
   use pd_run, only: run_t
   use pd_run_end, only: fail
-  use pd_system, only: pending_signal, sigint
+  use pd_system, only: pending_signal, sigint, signal_name
   use pd_timing, only: kernel_history
   implicit none
   private
@@ -73,7 +73,8 @@ contains
     call run%timing%lap(kernel_history)
     call write_frames_and_checkpoint(due, run, errors)
     if (due%stop .and. errors%count() == 0) call record_line(run%record, &
-      'stopped by a signal; --restart goes on from the checkpoint', errors)
+      'stopped by a signal ('//signal_name(pending_signal())// &
+      '); --restart goes on from the checkpoint', errors)
     call outcome%end_if_any(errors, exit_file)
     if (due%stop .and. .not. outcome%done) &
       call outcome%end_with(merge(exit_interrupted, exit_terminated, pending_signal() == sigint))

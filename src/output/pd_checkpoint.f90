@@ -20,6 +20,7 @@ module pd_checkpoint
   private
 
   public :: checkpoint_t, write_checkpoint, read_checkpoint, checkpoint_exists, remove_checkpoints
+  public :: checkpoint_mark
 
   !> What a run needs apart from its state.
   type :: checkpoint_t
@@ -67,6 +68,14 @@ contains
 
     checkpoint_exists = any([file_exists(newest(stem)), file_exists(previous(stem))])
   end function checkpoint_exists
+
+  !> What tells the present checkpoints from others: their heads.
+  function checkpoint_mark(stem) result(mark)
+    character(*), intent(in) :: stem
+    character(2 * head_length) :: mark
+
+    mark = found_head(newest(stem))//found_head(previous(stem))
+  end function checkpoint_mark
 
   !> Remove the checkpoints of an earlier run.
   !>
@@ -313,15 +322,25 @@ contains
   logical function is_whole(path)
     character(*), intent(in) :: path
     character(head_length) :: found
+
+    found = found_head(path)
+    is_whole = found /= ''
+    if (is_whole) is_whole = found == head(path)
+  end function is_whole
+
+  !> The first bytes of a file, '' where it cannot be read or is shorter.
+  function found_head(path) result(found)
+    character(*), intent(in) :: path
+    character(head_length) :: found
     integer :: unit, status
 
-    is_whole = .false.
+    found = ''
     open (newunit=unit, file=path, status='old', action='read', access='stream', iostat=status)
     if (status /= 0) return
     read (unit, iostat=status) found
     close (unit)
-    if (status == 0) is_whole = found == head(path)
-  end function is_whole
+    if (status /= 0) found = ''
+  end function found_head
 
   !> What the first bytes of a checkpoint should be, by the bytes that follow.
   function head(path)

@@ -3,8 +3,9 @@
 !> Not through Fortran's own units: the run-time library of gfortran keeps the errors of FLUSH and
 !> CLOSE to itself, so that a full disk goes unnoticed. Every return code is checked here.
 module pd_files
-  use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_int, c_null_char, c_null_ptr, &
-    c_ptr, c_size_t
+  use, intrinsic :: iso_c_binding, only: c_associated, c_int, c_null_char, c_null_ptr, c_ptr, &
+    c_size_t
+  use pd_c_files, only: c_fclose, c_fflush, c_fileno, c_fopen, c_fsync, c_fwrite
   use pd_errors, only: error_list_t
   use pd_system, only: make_directories, remove_file, rename_file
   implicit none
@@ -23,35 +24,6 @@ module pd_files
   contains
     procedure :: is_open
   end type output_file_t
-
-  interface
-    type(c_ptr) function c_fopen(path, mode) bind(c, name='fopen')
-      import :: c_char, c_ptr
-      character(kind=c_char), intent(in) :: path(*), mode(*)
-    end function c_fopen
-    integer(c_size_t) function c_fwrite(text, item, count, stream) bind(c, name='fwrite')
-      import :: c_char, c_ptr, c_size_t
-      character(kind=c_char), intent(in) :: text(*)
-      integer(c_size_t), value :: item, count
-      type(c_ptr), value :: stream
-    end function c_fwrite
-    integer(c_int) function c_fflush(stream) bind(c, name='fflush')
-      import :: c_int, c_ptr
-      type(c_ptr), value :: stream
-    end function c_fflush
-    integer(c_int) function c_fclose(stream) bind(c, name='fclose')
-      import :: c_int, c_ptr
-      type(c_ptr), value :: stream
-    end function c_fclose
-    integer(c_int) function c_fileno(stream) bind(c, name='fileno')
-      import :: c_int, c_ptr
-      type(c_ptr), value :: stream
-    end function c_fileno
-    integer(c_int) function c_fsync(descriptor) bind(c, name='fsync')
-      import :: c_int
-      integer(c_int), value :: descriptor
-    end function c_fsync
-  end interface
 
 contains
 
