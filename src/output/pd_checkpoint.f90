@@ -116,7 +116,7 @@ contains
     call state%visit(writer)
     errors = writer%errors
     call close_file(writer%file, errors)
-    if (errors%count() == before) call patch_file(temporary, head(temporary), errors)
+    if (errors%count() == before) call patch_file(temporary, 0_i8, head(temporary), errors)
     if (errors%count() == before) call sync_file(temporary, errors)
     if (errors%count() == before) then
       if (.not. is_whole(temporary)) then

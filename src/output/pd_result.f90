@@ -23,7 +23,7 @@ module pd_result
   use pd_system, only: remove_file
   use pd_timing, only: now
   use pd_tries, only: tries_t
-  use pd_xdmf, only: write_xdmf, xdmf_grid
+  use pd_xdmf, only: new_xdmf, xdmf_t
   implicit none
   private
 
@@ -43,15 +43,13 @@ module pd_result
 
   !> A result file of a run that is going on; the file itself is closed between calls.
   type :: result_t
-    character(:), allocatable :: path, xdmf_path
+    character(:), allocatable :: path
     integer :: n = 0                   !! points
     type(places_t) :: places           !! in the file
     type(frame_field_t), allocatable :: fields(:)
     type(column_t),      allocatable :: columns(:)
     logical :: has_strain = .false.    !! whether there are platens
-    logical :: yields = .false.        !! whether the points have a yield stress
-    integer :: written = 0             !! frames written so far
-    character(:), allocatable :: grids !! of these frames, for the XDMF file
+    type(xdmf_t) :: xdmf               !! the file for ParaView
     integer :: rows_written = 0
     integer,  private :: waiting = 0                   !! rows not written yet
     real(wp), private :: waiting_since = 0.0_wp        !! clock at the first of these rows [s]
@@ -111,7 +109,7 @@ contains
       call create_structure(result, new, description, errors)
       do i = 0, kept%frames - 1
         call copy_frame(old, new, frame_name(i), result%n, result%fields, moment, errors)
-        call note_frame(result, i, moment%time)
+        call result%xdmf%note(moment%time)
       end do
       call copy_rows(old, new, result%columns, kept%rows, errors)
       result%rows_written = kept%rows
@@ -184,7 +182,8 @@ contains
     result%waiting = 0
   end subroutine put_waiting_rows
 
-  !> Write frame `index` (0: the unloaded state) and the rows that wait, and renew the XDMF file.
+  !> Write frame `index` (0: the unloaded state) and the rows that wait, and add the frame to the
+  !> XDMF file.
   !>
   !> Errors: a file cannot be written; the frames before this one stay readable.
   subroutine write_frame(result, index, moment, model, state, errors)
@@ -208,8 +207,7 @@ contains
     call mark_frame(file, frame_name(index), with_strain(result, moment), .true., errors)
     call close_file(file, errors)
     if (errors%count() > before) return
-    call note_frame(result, index, moment%time)
-    call renew_xdmf(result, errors)
+    call result%xdmf%add_frame(moment%time, errors)
   end subroutine write_frame
 
   !> Write the state in which a run failed, marked as not valid, beside the frames, and the rows
@@ -280,7 +278,7 @@ contains
     call write_attribute(file, '/', 'time_step', moment%time_step, errors)
     call write_attribute(file, '/', 'complete', 1, errors)
     call close_file(file, errors)
-    call renew_xdmf(result, errors)
+    call result%xdmf%finish(errors)
   end subroutine finish_result
 
   subroutine describe_result(result, stem, description, places)
@@ -290,15 +288,14 @@ contains
     type(places_t),          intent(in)    :: places
 
     result%path = stem//'.h5'
-    result%xdmf_path = stem//'.xdmf'
     result%n = size(description%volume)
     result%places = places
     result%fields = description%fields
     result%columns = description%columns
     allocate (result%bunch_of(size(result%columns), bunch))
     result%has_strain = description%strain_axis /= 'none'
-    result%yields = allocated(description%yield_stress)
-    result%grids = ''
+    result%xdmf = new_xdmf(stem//'.xdmf', result%path, result%n, result%fields%field_label_t, &
+      places%frames, allocated(description%yield_stress))
   end subroutine describe_result
 
   !> Write everything but the contents of frames and rows, under the name of a temporary file.
@@ -322,7 +319,7 @@ contains
 
   !> Close the finished file, give it its name, and write the XDMF file that belongs to it.
   subroutine publish(result, file, errors)
-    type(result_t),     intent(in)    :: result
+    type(result_t),     intent(inout) :: result
     type(hdf5_file_t),  intent(inout) :: file
     type(error_list_t), intent(inout) :: errors
     integer :: before
@@ -333,7 +330,7 @@ contains
     call close_file(file, errors)
     if (good .and. errors%count() == before) then
       call replace_file(result%path//'.tmp', result%path, errors)
-      if (errors%count() == before) call renew_xdmf(result, errors)
+      if (errors%count() == before) call result%xdmf%write(errors)
     else
       call discard(result, file)
     end if
@@ -380,23 +377,6 @@ contains
       return
     end do
   end subroutine check_old_frames
-
-  subroutine note_frame(result, index_of_frame, time)
-    type(result_t), intent(inout) :: result
-    integer,        intent(in)    :: index_of_frame
-    real(wp),       intent(in)    :: time
-
-    result%written = result%written + 1
-    result%grids = result%grids//xdmf_grid(result%path(index(result%path, '/', back=.true.) + 1:), &
-      result%n, result%fields%field_label_t, index_of_frame, time, result%yields)
-  end subroutine note_frame
-
-  subroutine renew_xdmf(result, errors)
-    type(result_t),     intent(in)    :: result
-    type(error_list_t), intent(inout) :: errors
-
-    call write_xdmf(result%xdmf_path, result%grids, errors)
-  end subroutine renew_xdmf
 
   !> The moment with the nominal strain to be written: NaN where there are no platens.
   function with_strain(result, moment) result(written)

@@ -4,7 +4,7 @@ module pd_c_files
   implicit none
   private
 
-  public :: c_fopen, c_fwrite, c_fflush, c_fclose, c_fileno, c_fsync, c_fseek, c_truncate
+  public :: c_fopen, c_fwrite, c_fflush, c_fclose, c_fileno, c_fsync, c_pwrite, c_truncate
   public :: c_ftruncate, c_flock
 
   interface
@@ -34,12 +34,13 @@ module pd_c_files
       import :: c_int
       integer(c_int), value :: descriptor
     end function c_fsync
-    integer(c_int) function c_fseek(stream, offset, whence) bind(c, name='fseek')
-      import :: c_int, c_long, c_ptr
-      type(c_ptr), value :: stream
+    integer(c_size_t) function c_pwrite(descriptor, text, count, offset) bind(c, name='pwrite')
+      import :: c_char, c_int, c_long, c_size_t
+      integer(c_int), value :: descriptor
+      character(kind=c_char), intent(in) :: text(*)
+      integer(c_size_t), value :: count
       integer(c_long), value :: offset
-      integer(c_int), value :: whence
-    end function c_fseek
+    end function c_pwrite
     integer(c_int) function c_truncate(path, length) bind(c, name='truncate')
       import :: c_char, c_int, c_long
       character(kind=c_char), intent(in) :: path(*)

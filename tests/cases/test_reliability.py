@@ -4,7 +4,9 @@ import platform
 import signal
 import subprocess
 import time
+from xml.etree import ElementTree
 
+import h5py
 import pytest
 from case_files import SPECIMEN, begin, changed, contents, stop
 
@@ -120,6 +122,46 @@ def test_a_file_that_is_no_lock_is_left_alone(run_case, tmp_path):
     assert done.returncode == 5
     assert "case.lock" in done.stderr
     assert (tmp_path / "out" / "case.lock").read_text() == "of another program\n"
+
+
+# ------------------------------------------------------------------------------ cost of frames
+
+
+def test_frames_are_added_to_the_xdmf_file_in_place(program, tmp_path):
+    text = LONG.replace("frame_strains = 0.004, 0.01", "frame_count = 100")
+    process = begin(program, tmp_path, text)
+    path, result = tmp_path / "out" / "case.xdmf", tmp_path / "out" / "case.h5"
+    seen = set()
+    while process.poll() is None:
+        if not path.exists():
+            continue
+        process.send_signal(signal.SIGSTOP)
+        grids = list(ElementTree.parse(path).iter("Time"))  # a whole file at any moment
+        with h5py.File(result, "r", locking=False) as file:
+            written = sum(frame.attrs["written"] for frame in file["frames"].values())
+        assert len(grids) in (written, written - 1)
+        if process.poll() is None and 0 < written < 101:
+            seen.add((path.stat().st_ino, path.stat().st_size))
+        process.send_signal(signal.SIGCONT)
+        time.sleep(0.01)
+    assert process.returncode == 0
+    assert len(seen) == 1
+    assert path.stat().st_ino == seen.pop()[0]
+    assert path.read_text().endswith("</Xdmf>\n")
+
+
+def test_the_check_tells_what_frames_take_of_the_disk(run_case, tmp_path):
+    sizes = []
+    for count in (10, 110):
+        text = SPECIMEN.replace("frame_strains = 0.004, 0.01", f"frame_count = {count}")
+        told = run_case(text, tmp_path, "--check").stdout
+        told = float(told.split("disk ")[1].split()[0]) * 1e6
+        assert run_case(text, tmp_path, "--quiet", "--force").returncode == 0
+        found = sum(path.stat().st_size for path in (tmp_path / "out").iterdir())
+        assert told == pytest.approx(found, rel=0.2)
+        sizes.append((told, found))
+    more = [late - early for early, late in zip(*sizes)]
+    assert more[0] == pytest.approx(more[1], rel=0.1)
 
 
 # ------------------------------------------------------------------------------ signals
