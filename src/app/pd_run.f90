@@ -58,6 +58,8 @@ module pd_run
     type(checkpoint_t) :: checkpoint          !! to continue from; no rows: a new run
     character(:), allocatable :: mark         !! of its file
     type(error_list_t) :: warnings
+    logical :: whole = .false.                !! files are open, and the state is one to go on from
+    type(error_list_t) :: trouble             !! with files, in a step whose state is not whole
     logical :: doubted = .false.              !! the energy balance has been warned of
     logical :: jump_told = .false.            !! at equilibrium
     logical :: balance_doubted = .false.      !! that of the forces, too
@@ -400,11 +402,18 @@ contains
         if (errors%count() == 0) call record_frame(run%model, run%state, record, errors)
       else
         call record_line(record, 'going on from a checkpoint', errors)
+        do i = 1, run%checkpoint%rows_owed
+          call record_row(record, errors)
+        end do
+        do i = 1, run%checkpoint%frames_owed
+          call record_frame(run%model, run%state, record, errors)
+        end do
       end if
       call record_progress(run%model, run%state, run%schedule, run%clock, record, errors)
     end associate
     deallocate (run%model%strength)   ! the state has it, and the result file
     call outcome%end_if_any(errors, exit_file)
+    run%whole = .not. outcome%done
     call system_clock(run%last_checkpoint)
     run%loop_start = run%last_checkpoint
   end subroutine open_outputs

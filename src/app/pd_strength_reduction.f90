@@ -38,6 +38,7 @@ contains
 
     if (outcome%done .or. size(run%input%strength_reduction) == 0) return
     start = run%state
+    run%whole = .false.   ! the states of the search are none to go on from
     allocate (unreduced, source=run%model%materials%list)
     associate (given => run%input%strength_reduction(1))
       call try(given%first, start, unreduced, run, tries, errors)

@@ -28,6 +28,7 @@ module pd_checkpoint
     type(step_limit_t) :: limit
     integer  :: history_rows = 0        !! written so far
     integer  :: frames_written = 0      !! written so far, 000000 among them
+    integer  :: rows_owed = 0, frames_owed = 0   !! due at this step, but could not be written
     character(:), allocatable :: ledger_names(:)
     real(wp),     allocatable :: ledger(:)          !! any numbers, by these names
     real(wp),     allocatable :: ledger_blocks(:, :)   !! the same, per block (blocks, numbers)
@@ -58,7 +59,7 @@ module pd_checkpoint
   end type reading_t
 
   integer, parameter :: head_length = 512
-  integer, parameter :: schema_version = 4
+  integer, parameter :: schema_version = 5
   character(*), parameter :: schema = 'perigeo checkpoint'
 
 contains
@@ -178,6 +179,8 @@ contains
     call write_attribute(file, '/', 'limit_shortest', checkpoint%limit%shortest, errors)
     call write_attribute(file, '/', 'history_rows', checkpoint%history_rows, errors)
     call write_attribute(file, '/', 'frames_written', checkpoint%frames_written, errors)
+    call write_attribute(file, '/', 'rows_owed', checkpoint%rows_owed, errors)
+    call write_attribute(file, '/', 'frames_owed', checkpoint%frames_owed, errors)
     call write_dataset(file, '/ledger_names', checkpoint%ledger_names, errors)
     call write_dataset(file, '/ledger', checkpoint%ledger, errors)
     call write_dataset(file, '/ledger_blocks', checkpoint%ledger_blocks, errors)
@@ -309,6 +312,8 @@ contains
     call read_attribute(file, '/', 'limit_shortest', checkpoint%limit%shortest, errors)
     call read_attribute(file, '/', 'history_rows', checkpoint%history_rows, errors)
     call read_attribute(file, '/', 'frames_written', checkpoint%frames_written, errors)
+    call read_attribute(file, '/', 'rows_owed', checkpoint%rows_owed, errors)
+    call read_attribute(file, '/', 'frames_owed', checkpoint%frames_owed, errors)
     call read_dataset(file, '/ledger_names', checkpoint%ledger_names, errors)
     call read_dataset(file, '/ledger', checkpoint%ledger, errors)
     call read_dataset(file, '/ledger_blocks', checkpoint%ledger_blocks, errors)

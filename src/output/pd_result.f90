@@ -17,10 +17,13 @@ module pd_result
   use pd_labels, only: label_t
   use pd_model, only: model_t
   use pd_observe, only: column_t, moment_t
-  use pd_rows, only: check_rows, copy_rows, put_rows, reserve_rows, resize_rows
-  use pd_run_description, only: run_description_t, schema, schema_version, write_description
+  use pd_rows, only: check_rows, compare_rows, copy_rows, put_rows, reserve_rows, resize_rows, &
+    rows_in
+  use pd_run_description, only: run_description_t, schema, schema_version, write_description, &
+    writer_of
   use pd_state, only: state_t
   use pd_system, only: remove_file
+  use pd_text, only: integer_text
   use pd_timing, only: now
   use pd_tries, only: tries_t
   use pd_xdmf, only: new_xdmf, xdmf_t
@@ -50,6 +53,9 @@ module pd_result
     type(column_t),      allocatable :: columns(:)
     logical :: has_strain = .false.    !! whether there are platens
     type(xdmf_t) :: xdmf               !! the file for ParaView
+    character(:), allocatable :: writer   !! which run wrote the file: this one
+    logical :: is_foreign = .false.    !! another one has been found in its place
+    logical :: is_lost = .false.       !! it could not be opened
     integer :: rows_written = 0
     integer,  private :: waiting = 0                   !! rows not written yet
     real(wp), private :: waiting_since = 0.0_wp        !! clock at the first of these rows [s]
@@ -85,9 +91,12 @@ contains
   !> Go on with the result file of a run that was cut off: a new file with the first frames and rows
   !> of the old one and space for more replaces it.
   !>
+  !> `rows`: those of the CSV file, which may have some that the old result file has not; absent:
+  !> those of the old file.
   !> Errors: no such file, another set of points, other columns, fewer frames or rows than the
-  !> checkpoint knows of, or the files cannot be written. The old file is then as it was.
-  subroutine resume_result(result, stem, description, kept, more, step, errors)
+  !> checkpoint knows of, rows that differ, or the files cannot be written. The old file is then as
+  !> it was.
+  subroutine resume_result(result, stem, description, kept, more, step, errors, rows)
     type(result_t),          intent(out)   :: result
     character(*),            intent(in)    :: stem
     type(run_description_t), intent(in)    :: description
@@ -95,6 +104,7 @@ contains
     type(places_t),          intent(in)    :: more
     integer,                 intent(in)    :: step   !! of the checkpoint
     type(error_list_t),      intent(inout) :: errors
+    real(wp),                intent(in), optional :: rows(:, :)   !! (columns,rows)
     type(hdf5_file_t) :: old, new
     type(moment_t) :: moment
     integer :: i, before
@@ -104,14 +114,22 @@ contains
       kept%rows + more%rows))
     call open_file(old, result%path, .false., errors)
     call check_old_frames(old, result%path, kept%frames, step, errors)
-    if (errors%count() == before) call check_rows(old, result%columns, kept%rows, errors)
+    if (present(rows)) then
+      if (errors%count() == before) call compare_rows(old, result%columns, rows, errors)
+    else
+      if (errors%count() == before) call check_rows(old, result%columns, kept%rows, errors)
+    end if
     if (errors%count() == before) then
       call create_structure(result, new, description, errors)
       do i = 0, kept%frames - 1
         call copy_frame(old, new, frame_name(i), result%n, result%fields, moment, errors)
         call result%xdmf%note(moment%time)
       end do
-      call copy_rows(old, new, result%columns, kept%rows, errors)
+      if (present(rows)) then
+        call put_rows(new, result%columns, 0, rows, errors)
+      else
+        call copy_rows(old, new, result%columns, kept%rows, errors)
+      end if
       result%rows_written = kept%rows
     end if
     call close_file(old, errors)
@@ -148,12 +166,39 @@ contains
     type(error_list_t), intent(inout) :: errors
     type(hdf5_file_t) :: file
 
-    call open_file(file, result%path, .true., errors)
+    call open_own(result, file, errors)
     call put_waiting_rows(result, file, errors)
     result%places%rows = 2 * result%places%rows + bunch
     call resize_rows(file, result%columns, result%rows_written, result%places%rows, errors)
     call close_file(file, errors)
   end subroutine make_room
+
+  !> Open the file for writing, and look whether it is the one that this run has made.
+  !>
+  !> Errors: it is gone, or another one is in its place.
+  subroutine open_own(result, file, errors)
+    type(result_t),     intent(inout) :: result
+    type(hdf5_file_t),  intent(inout) :: file
+    type(error_list_t), intent(inout) :: errors
+    character(:), allocatable :: found
+    integer :: rows
+
+    call open_file(file, result%path, .true., errors)
+    found = writer_of(file, errors)
+    rows = rows_in(file, errors)
+    result%is_lost = .not. file%is_good()
+    if (result%is_lost) return
+    if (found == result%writer .and. rows == result%rows_written) return
+    result%is_foreign = found /= result%writer
+    if (result%is_foreign) then
+      call errors%add('another file has taken the place of the result of this run', &
+        where=result%path, found=found, allowed=result%writer)
+    else
+      call errors%add('the result has lost rows of its history', where=result%path, &
+        found=integer_text(rows), allowed=integer_text(result%rows_written))
+    end if
+    file%failed = .true.
+  end subroutine open_own
 
   !> Write the rows that wait.
   !>
@@ -164,7 +209,7 @@ contains
     type(hdf5_file_t) :: file
 
     if (result%waiting == 0) return
-    call open_file(file, result%path, .true., errors)
+    call open_own(result, file, errors)
     call put_waiting_rows(result, file, errors)
     call close_file(file, errors)
   end subroutine write_rows
@@ -201,7 +246,7 @@ contains
       call errors%add('there is no place for frame '//frame_name(index), where=result%path)
       return
     end if
-    call open_file(file, result%path, .true., errors)
+    call open_own(result, file, errors)
     call put_waiting_rows(result, file, errors)
     call put_frame(file, frame_name(index), result%fields, model, state, errors)
     call mark_frame(file, frame_name(index), with_strain(result, moment), .true., errors)
@@ -222,7 +267,7 @@ contains
     type(error_list_t), intent(inout) :: errors
     type(hdf5_file_t) :: file
 
-    call open_file(file, result%path, .true., errors)
+    call open_own(result, file, errors)
     call put_waiting_rows(result, file, errors)
     call put_frame(file, '/failed_frame', result%fields, model, state, errors)
     call mark_frame(file, '/failed_frame', with_strain(result, moment), .false., errors)
@@ -237,7 +282,7 @@ contains
     character(*), parameter :: group = '/strength_reduction'
     type(hdf5_file_t) :: file
 
-    call open_file(file, result%path, .true., errors)
+    call open_own(result, file, errors)
     call create_group(file, group, errors)
     call write_attribute(file, group, 'borne', tries%least(), errors)
     call write_attribute(file, group, 'not_borne', tries%most(), errors)
@@ -264,21 +309,28 @@ contains
 
   !> Write the rows that wait, and mark the result as complete: the run has come to its end. Only
   !> now are the number of steps and of rows known for sure, for the time step may have changed.
+  !>
+  !> Errors: a file cannot be written; the result is not complete then.
   subroutine finish_result(result, moment, errors)
     type(result_t),     intent(inout) :: result
     type(moment_t),     intent(in)    :: moment   !! the end
     type(error_list_t), intent(inout) :: errors
     type(hdf5_file_t) :: file
+    integer :: before
 
-    call open_file(file, result%path, .true., errors)
+    before = errors%count()
+    call open_own(result, file, errors)
     call put_waiting_rows(result, file, errors)
     if (result%rows_written < result%places%rows) &
       call resize_rows(file, result%columns, result%rows_written, result%rows_written, errors)
     call write_attribute(file, '/', 'steps', moment%step, errors)
     call write_attribute(file, '/', 'time_step', moment%time_step, errors)
-    call write_attribute(file, '/', 'complete', 1, errors)
     call close_file(file, errors)
     call result%xdmf%finish(errors)
+    if (errors%count() > before) return
+    call open_own(result, file, errors)
+    call write_attribute(file, '/', 'complete', 1, errors)
+    call close_file(file, errors)
   end subroutine finish_result
 
   subroutine describe_result(result, stem, description, places)
@@ -300,7 +352,7 @@ contains
 
   !> Write everything but the contents of frames and rows, under the name of a temporary file.
   subroutine create_structure(result, file, description, errors)
-    type(result_t),          intent(in)    :: result
+    type(result_t),          intent(inout) :: result
     type(hdf5_file_t),       intent(inout) :: file
     type(run_description_t), intent(in)    :: description
     type(error_list_t),      intent(inout) :: errors
@@ -308,6 +360,7 @@ contains
 
     call create_file(file, result%path//'.tmp', 0, errors)
     call write_description(file, description, result%places%frames, errors)
+    result%writer = writer_of(file, errors)
     call reserve_rows(file, result%columns, result%places%rows, errors)
     call create_group(file, '/frames', errors)
     do i = 0, result%places%frames - 1

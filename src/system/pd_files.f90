@@ -13,7 +13,8 @@ module pd_files
   implicit none
   private
 
-  public :: output_file_t, open_output, write_line, flush_output, close_output
+  public :: output_file_t, open_output, write_line, flush_output, check_in_place
+  public :: close_output
   public :: replace_file, sync_file, patch_file, cut_file, size_of_file, publish_output
   public :: prepare_folder, file_exists
 
@@ -23,6 +24,7 @@ module pd_files
     private
     type(c_ptr) :: stream = c_null_ptr
     character(:), allocatable :: path
+    integer(i8) :: bytes = 0        !! written so far, those before an opening among them
     logical :: failed = .false.
   contains
     procedure :: is_open
@@ -45,13 +47,16 @@ contains
     character(*),        intent(in)    :: path
     logical,             intent(in)    :: append
     type(error_list_t),  intent(inout) :: errors
+    integer(c_int) :: ignored
 
     file%path = path
-    if (append) then
-      file%stream = c_fopen(path//c_null_char, 'ab'//c_null_char)
-    else
+    if (append) file%bytes = max(0_i8, size_of_file(path))
+    if (.not. append) then
       file%stream = c_fopen(path//c_null_char, 'wb'//c_null_char)
+      if (c_associated(file%stream)) ignored = c_fclose(file%stream)
     end if
+    ! always behind what is there: a file that someone cuts off gets no hole
+    file%stream = c_fopen(path//c_null_char, 'ab'//c_null_char)
     if (c_associated(file%stream)) return
     file%failed = .true.
     call errors%add('cannot be opened for writing: is the folder there, is writing permitted, ' &
@@ -70,6 +75,7 @@ contains
     if (c_fwrite(text//new_line('a'), 1_c_size_t, length, file%stream) /= length) then
       call report_write(file, errors)
     end if
+    file%bytes = file%bytes + int(length, i8)
   end subroutine write_line
 
   !> Hand everything written so far to the operating system.
@@ -80,6 +86,19 @@ contains
     if (.not. file%is_open()) return
     if (c_fflush(file%stream) /= 0) call report_write(file, errors)
   end subroutine flush_output
+
+  !> Report an error where the file is no longer under its name: it was removed, replaced or changed
+  !> by someone else while it was being written. Everything must have been handed over before.
+  subroutine check_in_place(file, errors)
+    type(output_file_t), intent(inout) :: file
+    type(error_list_t),  intent(inout) :: errors
+
+    if (.not. file%is_open()) return
+    if (size_of_file(file%path) == file%bytes) return
+    file%failed = .true.
+    call errors%add('was removed, replaced or changed by someone else during the run', &
+      where=file%path)
+  end subroutine check_in_place
 
   !> Close the file; harmless where it is not open.
   subroutine close_output(file, errors)
