@@ -269,3 +269,52 @@ def test_no_display_is_needed(result: Path, monkeypatch: pytest.MonkeyPatch) -> 
         env=environment, capture_output=True, text=True, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
+
+
+COMMANDS_THAT_WRITE = [
+    ["curves", "--csv"],
+    ["compare", "--csv"],
+    ["compare", "--table"],
+    ["contours", "--csv"],
+    ["band", "--csv"],
+    ["band", "--table"],
+    ["curves", "-o"],
+    ["animate", "-o"],
+]
+
+
+@pytest.mark.parametrize("command", COMMANDS_THAT_WRITE, ids=" ".join)
+@pytest.mark.parametrize("victim", ["made.h5", "cut.h5", "made_history.csv", "run.nml", "case.h5"])
+def test_outputs_destroy_nothing(
+    command: list[str], victim: str, result: Path, cut_off: Path, capsys: Capture
+) -> None:
+    folder = result.parent
+    (folder / "run.nml").write_text("! a run\n&run name = 'run' /\n")
+    (folder / "case.h5").write_bytes(b"perigeo checkpoint".ljust(512) + cut_off.read_bytes())
+    target = folder / victim
+    if command[-1] == "-o":  # a figure must have its ending
+        target = folder / f"{victim}{'.gif' if command[0] == 'animate' else '.png'}"
+        target.write_bytes((folder / victim).read_bytes())
+    before = {path: path.read_bytes() for path in folder.iterdir()}
+    line = refused(capsys, 5, *command, target, result)
+    assert str(target) in line
+    assert {path: path.read_bytes() for path in folder.iterdir()} == before
+
+
+def test_an_input_is_known_by_any_of_its_names(result: Path, capsys: Capture) -> None:
+    (result.parent / "link.csv").symlink_to(result)
+    line = refused(capsys, 5, "curves", "--csv", result.parent / "link.csv", result)
+    assert "is an input of this command" in line
+
+
+def test_outputs_replace_their_like_only(result: Path, capsys: Capture) -> None:
+    figure, table = result.parent / "a.png", result.parent / "a.csv"
+    for _ in range(2):
+        assert main(["curves", str(result), "-o", str(figure), "--csv", str(table)]) == 0
+    capsys.readouterr()
+    for path, option in ((figure, "-o"), (table, "--csv")):
+        path.write_text("notes of a week\n")
+        assert "file of another kind" in refused(capsys, 5, "curves", option, path, result)
+        assert path.read_text() == "notes of a week\n"
+    line = refused(capsys, 1, "band", "--csv", "b.csv", "--table", "./b.csv", result)
+    assert "two outputs have one name" in line

@@ -12,12 +12,15 @@ module pd_points_file
   use pd_input_types, only: input_t
   use pd_kinds, only: wp
   use pd_model, only: model_t
+  use pd_own_files, only: keep_inputs_from
   use pd_pressure, only: pressure_t
   use pd_text, only: number_text
   implicit none
   private
 
   public :: write_points
+
+  character(*), parameter :: head = '# perigeo points 1: lengths in m, forces in N/m'
 
 contains
 
@@ -29,13 +32,18 @@ contains
     type(input_t),      intent(in)    :: input
     type(model_t),      intent(in)    :: model
     type(error_list_t), intent(inout) :: errors
-    integer :: status, unit
+    integer :: status, unit, before
     logical :: good
 
+    before = errors%count()
+    call keep_inputs_from(path, input, errors)
+    if (.not. may_be_replaced(path)) call errors%add('is not overwritten: it holds something '// &
+      'else than points that --points has written', path)
+    if (errors%count() > before) return
     open (newunit=unit, file=path, status='replace', action='write', iostat=status)
     good = status == 0
     if (good) then
-      call put(unit, '# perigeo points 1: lengths in m, forces in N/m', good)
+      call put(unit, head, good)
       call put_points(unit, input, model, good)
       call put_loads(unit, model, good)
       associate (flaw => input%imperfection)
@@ -47,6 +55,22 @@ contains
     end if
     if (.not. good) call errors%add('the file cannot be written', path)
   end subroutine write_points
+
+  !> Whether a file is not there, is empty, or holds points of an earlier call.
+  logical function may_be_replaced(path) result(may)
+    character(*), intent(in) :: path
+    character(len(head)) :: line
+    integer :: status, unit, bytes
+
+    inquire (file=path, exist=may, size=bytes)
+    may = .not. may .or. bytes <= 0
+    if (may) return
+    open (newunit=unit, file=path, status='old', action='read', iostat=status)
+    if (status /= 0) return
+    read (unit, '(a)', iostat=status) line
+    close (unit)
+    may = status == 0 .and. line == head
+  end function may_be_replaced
 
   !> Write one line, unless one before it could not be written.
   subroutine put(unit, line, good)

@@ -3,18 +3,21 @@ module pd_run
   use, intrinsic :: iso_fortran_env, only: compiler_version, int64
   use omp_lib, only: omp_get_max_threads
   use pd_body_force, only: body_force_t, new_body_force
-  use pd_checkpoint, only: checkpoint_t
+  use pd_checkpoint, only: checkpoint_mark, checkpoint_t
   use pd_clock, only: clock_t
   use pd_command_line, only: options_t
   use pd_errors, only: error_list_t, exit_file, exit_input, exit_model, outcome_t
+  use pd_files, only: prepare_folder
   use pd_history_columns, only: history_columns
   use pd_increment, only: begin_increments, increments_t, new_increments
   use pd_input, only: read_input
   use pd_input_types, only: input_t
   use pd_kinds, only: is_set, wp
   use pd_ledger, only: ledger_t, new_ledger
+  use pd_lock, only: lock_holder, lock_t, take_lock
   use pd_model, only: model_t, move_planes, release_set_up, start
   use pd_observe, only: column_t, moment_at, observation_t, observe
+  use pd_own_files, only: keep_inputs, lock_path
   use pd_record, only: load_checkpoint, observe_state, open_record, record_frame, record_line, &
     record_progress, record_row, record_t, results_in_the_way, same_history, same_points
   use pd_reversal, only: new_reversal, reversal_t
@@ -49,10 +52,14 @@ module pd_run
     type(ledger_t)     :: ledger
     type(step_work_t)  :: work
     type(increments_t) :: increments          !! on the way of equilibrium
+    type(lock_t)       :: lock                !! on the files of the run
     type(record_t)     :: record
     type(timing_t)     :: timing
     type(checkpoint_t) :: checkpoint          !! to continue from; no rows: a new run
+    character(:), allocatable :: mark         !! of its file
     type(error_list_t) :: warnings
+    logical :: whole = .false.                !! files are open, and the state is one to go on from
+    type(error_list_t) :: trouble             !! with files, in a step whose state is not whole
     logical :: doubted = .false.              !! the energy balance has been warned of
     logical :: jump_told = .false.            !! at equilibrium
     logical :: balance_doubted = .false.      !! that of the forces, too
@@ -76,7 +83,9 @@ contains
     call outcome%end_if_any(errors, exit_input)
     if (outcome%done) return
     if (options%output_dir /= '') run%input%run%output_dir = options%output_dir
-    if (.not. options%check) call look_for_earlier_run(options, run, outcome)
+    call keep_inputs(stem_of(run), run%input, errors)
+    call outcome%end_if_any(errors, exit_file)
+    if (.not. (options%check .or. outcome%done)) call look_for_earlier_run(options, run, outcome)
     if (outcome%done) return
 
     allocate (run%stages, source=stages_of(run%input))
@@ -262,30 +271,69 @@ contains
     end associate
   end subroutine look_at_cloud
 
-  !> Results of an earlier run are overwritten or continued only on request; a checkpoint is read
-  !> if the run continues from it.
+  !> Output folder and name of a run.
+  pure function stem_of(run) result(stem)
+    type(run_t), intent(in) :: run
+    character(:), allocatable :: stem
+
+    stem = run%input%run%output_dir//'/'//run%input%run%name
+  end function stem_of
+
+  !> Results of an earlier run are overwritten or continued only on request, those of a living one
+  !> never; a checkpoint is read if the run continues from it.
   subroutine look_for_earlier_run(options, run, outcome)
     type(options_t), intent(in)    :: options
     type(run_t),     intent(inout) :: run
     type(outcome_t), intent(inout) :: outcome
     type(error_list_t) :: errors, input_errors
-    character(:), allocatable :: stem, warning
+    character(:), allocatable :: warning, living
 
-    stem = run%input%run%output_dir//'/'//run%input%run%name
+    living = lock_holder(lock_path(stem_of(run)))
+    if (living /= '') call errors%add(living, stem_of(run))
+    call outcome%end_if_any(errors, exit_file)
+    if (outcome%done) return
     if (options%restart) then
+      run%mark = checkpoint_mark(stem_of(run))
       call load_checkpoint(run%input, run%checkpoint, run%state, run%ledger, warning, errors, &
         input_errors)
       call outcome%end_if_any(errors, exit_file)
       call outcome%end_if_any(input_errors, exit_input)
       if (outcome%done) return
       if (warning /= '') call run%warnings%add(warning)
-    else if (.not. options%force) then
-      if (results_in_the_way(stem)) call errors%add('there are results of an earlier run; '// &
-        '--force overwrites them, --restart goes on from a checkpoint, --output DIR writes '// &
-        'elsewhere', stem)
+    else
+      call refuse_results(options, run, errors)
       call outcome%end_if_any(errors, exit_file)
     end if
   end subroutine look_for_earlier_run
+
+  !> Report an error where there are results that the user does not want to lose.
+  subroutine refuse_results(options, run, errors)
+    type(options_t),    intent(in)    :: options
+    type(run_t),        intent(in)    :: run
+    type(error_list_t), intent(inout) :: errors
+
+    if (options%force) return
+    if (.not. results_in_the_way(stem_of(run))) return
+    call errors%add('there are results of an earlier run; --force overwrites them, --restart '// &
+      'goes on from a checkpoint, --output DIR writes elsewhere', stem_of(run))
+  end subroutine refuse_results
+
+  !> Lock the files of the run. Another one may have come in between while the model was set up:
+  !> look again whether its results, or another checkpoint, are there.
+  subroutine claim_files(options, run, errors)
+    type(options_t),    intent(in)    :: options
+    type(run_t),        intent(inout) :: run
+    type(error_list_t), intent(inout) :: errors
+
+    call prepare_folder(run%input%run%output_dir, errors)
+    if (errors%count() == 0) call take_lock(run%lock, lock_path(stem_of(run)), errors)
+    if (errors%count() > 0) return
+    if (.not. options%restart) then
+      call refuse_results(options, run, errors)
+    else if (run%mark /= checkpoint_mark(stem_of(run))) then
+      call errors%add('another run has written a checkpoint just now', stem_of(run))
+    end if
+  end subroutine claim_files
 
   !> The unloaded state, or that of the checkpoint.
   subroutine begin_state(run)
@@ -331,6 +379,9 @@ contains
     call get_command(length=length)
     allocate (character(length) :: command)
     call get_command(command)
+    call claim_files(options, run, errors)
+    call outcome%end_if_any(errors, exit_file)
+    if (outcome%done) return
     call open_record(run%input, provenance_t(code_version, git_hash, compiler_version(), &
       build_flags, command, omp_get_max_threads()), run%model, run%schedule, run%checkpoint, &
       options%quiet, run%record, errors)
@@ -352,11 +403,18 @@ contains
         if (errors%count() == 0) call record_frame(run%model, run%state, record, errors)
       else
         call record_line(record, 'going on from a checkpoint', errors)
+        do i = 1, run%checkpoint%rows_owed
+          call record_row(record, errors)
+        end do
+        do i = 1, run%checkpoint%frames_owed
+          call record_frame(run%model, run%state, record, errors)
+        end do
       end if
       call record_progress(run%model, run%state, run%schedule, run%clock, record, errors)
     end associate
     deallocate (run%model%strength)   ! the state has it, and the result file
     call outcome%end_if_any(errors, exit_file)
+    run%whole = .not. outcome%done
     call system_clock(run%last_checkpoint)
     run%loop_start = run%last_checkpoint
   end subroutine open_outputs

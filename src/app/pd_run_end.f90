@@ -4,7 +4,7 @@ module pd_run_end
   use pd_errors, only: error_list_t, exit_calculation, exit_file, exit_ok, outcome_t
   use pd_kinds, only: wp
   use pd_record, only: close_record, observe_state, record_failure, record_frame, record_line, &
-    record_row
+    record_row, save_last_checkpoint
   use pd_run, only: run_t
   use pd_text, only: integer_text, short_number
   use pd_timing, only: kernel_names
@@ -12,7 +12,7 @@ module pd_run_end
   implicit none
   private
 
-  public :: finish_run, end_without_equilibrium, fail, fastest_row, remedy
+  public :: finish_run, end_without_equilibrium, fail, fastest_row, remedy, keep_state
 
 contains
 
@@ -124,6 +124,23 @@ contains
     call close_record(run%record, errors)
     call outcome%end_if_any(errors, exit_file)
   end subroutine finish_run
+
+  !> A run that ends because of a file: keep its state, if that can be written.
+  subroutine keep_state(run, outcome)
+    type(run_t),     intent(inout) :: run
+    type(outcome_t), intent(inout) :: outcome
+    type(error_list_t) :: errors, unheard
+    character(:), allocatable :: text
+
+    if (outcome%status /= exit_file .or. .not. run%whole) return
+    call save_last_checkpoint(run%model, run%state, run%ledger, run%clock, run%limit, &
+      run%record, errors)
+    text = 'the state of step '//integer_text(run%clock%step)//' could not be kept'
+    if (errors%count() == 0) text = 'a checkpoint of step '//integer_text(run%clock%step)// &
+      ' was written: --restart goes on from it once that is mended'
+    call outcome%errors%add(text)
+    call record_line(run%record, text, unheard)
+  end subroutine keep_state
 
   !> Last lines of the log: seconds of the time loop and of its kernels; the rest is frames and
   !> checkpoints.

@@ -10,7 +10,7 @@ module pd_run_steps
     save_checkpoint
   use pd_run, only: run_t
   use pd_run_end, only: fail
-  use pd_system, only: pending_signal, sigint
+  use pd_system, only: pending_signal, sigint, signal_name
   use pd_timing, only: kernel_history
   implicit none
   private
@@ -35,7 +35,7 @@ contains
 
     due%row = run%schedule%row_due(step)
     due%frame = run%schedule%frames_due(step) > 0
-    due%stop = pending_signal() /= 0
+    due%stop = pending_signal() /= 0 .or. run%trouble%count() > 0
     due%checkpoint = due%stop
     associate (every => run%input%output%checkpoint_every)
       if (every > 0.0_wp) then
@@ -45,7 +45,7 @@ contains
       end if
     end associate
     due%anything = due%row .or. due%frame .or. due%checkpoint
-    due%whole = due%anything .or. run%limit%look_due(step)
+    due%whole = due%anything .or. run%limit%look_due(step) .or. run%model%at_equilibrium
   end function due_after_step
 
   !> Write what is due, but check the state first: a run that gains energy has failed.
@@ -58,6 +58,7 @@ contains
     type(outcome_t), intent(inout) :: outcome
     type(error_list_t) :: errors
 
+    run%whole = due%whole
     if (failed_row > 0) &
       call fail('det F is not positive, or not a number', failed_row, run, outcome)
     if (outcome%done) return
@@ -72,8 +73,14 @@ contains
       call record_progress(run%model, run%state, run%schedule, run%clock, run%record, errors)
     call run%timing%lap(kernel_history)
     call write_frames_and_checkpoint(due, run, errors)
+    if (run%trouble%count() > 0) errors = run%trouble
     if (due%stop .and. errors%count() == 0) call record_line(run%record, &
-      'stopped by a signal; --restart goes on from the checkpoint', errors)
+      'stopped by a signal ('//signal_name(pending_signal())// &
+      '); --restart goes on from the checkpoint', errors)
+    if (errors%count() > 0 .and. .not. due%whole) then
+      run%trouble = errors   ! one step more, whose state can be kept
+      return
+    end if
     call outcome%end_if_any(errors, exit_file)
     if (due%stop .and. .not. outcome%done) &
       call outcome%end_with(merge(exit_interrupted, exit_terminated, pending_signal() == sigint))

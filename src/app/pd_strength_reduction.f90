@@ -14,7 +14,7 @@ module pd_strength_reduction
   use pd_run, only: run_t
   use pd_run_end, only: fail, fastest_row
   use pd_state, only: state_t
-  use pd_system, only: pending_signal, sigint
+  use pd_system, only: pending_signal, sigint, signal_name
   use pd_text, only: integer_text, short_number
   use pd_tries, only: tries_t
   implicit none
@@ -38,6 +38,7 @@ contains
 
     if (outcome%done .or. size(run%input%strength_reduction) == 0) return
     start = run%state
+    run%whole = .false.   ! the states of the search are none to go on from
     allocate (unreduced, source=run%model%materials%list)
     associate (given => run%input%strength_reduction(1))
       call try(given%first, start, unreduced, run, tries, errors)
@@ -116,7 +117,8 @@ contains
     call save_checkpoint(run%model, run%state, run%ledger, run%clock, run%limit, run%record, &
       errors)
     if (errors%count() == 0) call record_line(run%record, &
-      'stopped by a signal; --restart looks for the factor of safety anew', errors)
+      'stopped by a signal ('//signal_name(pending_signal())// &
+      '); --restart looks for the factor of safety anew', errors)
     call outcome%end_if_any(errors, exit_file)
     if (.not. outcome%done) &
       call outcome%end_with(merge(exit_interrupted, exit_terminated, pending_signal() == sigint))

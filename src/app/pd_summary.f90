@@ -3,9 +3,12 @@ module pd_summary
   use, intrinsic :: iso_fortran_env, only: int64
   use pd_clock, only: clock_t
   use pd_forces, only: linear_forces
+  use pd_frame_fields, only: frame_field_t, frame_fields
+  use pd_history_columns, only: history_columns
   use pd_input_types, only: input_t, material_input_t
   use pd_kinds, only: is_set, wp
   use pd_model, only: model_t
+  use pd_observe, only: column_t
   use pd_random_field, only: spread_of, spread_t
   use pd_relaxation, only: numbers_per_row
   use pd_schedule, only: schedule_t
@@ -87,6 +90,9 @@ contains
       call add_probes(model, summary)
       call summary%add('frames', whole(size(schedule%frame_steps))// &
         ' and the unloaded state; history rows '//whole(schedule%rows))
+      call summary%add('disk', number((frames_on_disk(model, schedule) &
+        + rows_on_disk(model, schedule)) / 1.0e6_wp)//' MB, of which frames '// &
+        number(frames_on_disk(model, schedule) / 1.0e6_wp)//' MB')
       call summary%add('memory', number(memory(input, model) / 1.0e6_wp)//' MB')
     end associate
   end function summarise
@@ -261,8 +267,36 @@ contains
     memory = model%operators%memory() + real(model%operators%n, wp) * 8.0_wp * real(numbers, wp)
   end function memory
 
+  !> Frames on the disk [bytes]: their numbers, and what names and describes them in both files.
+  real(wp) function frames_on_disk(model, schedule) result(bytes)
+    type(model_t),    intent(in) :: model
+    type(schedule_t), intent(in) :: schedule
+    type(frame_field_t), allocatable :: fields(:)
+    real(wp), parameter :: around = 1.0e4_wp
+    integer :: numbers, k
+
+    call frame_fields(fields, model%whole%n > 0)
+    numbers = 0
+    do k = 1, size(fields)
+      numbers = numbers + fields(k)%width()
+    end do
+    ! the unloaded state, and room for the state of a failure
+    bytes = real(size(schedule%frame_steps) + 2, wp) * (around + 8.0_wp * real(numbers, wp) &
+      * real(max(model%body%n, model%whole%n), wp))
+  end function frames_on_disk
+
+  !> The history on the disk [bytes]: 8 for a number in the result file, 24 in the CSV file.
+  real(wp) function rows_on_disk(model, schedule) result(bytes)
+    type(model_t),    intent(in) :: model
+    type(schedule_t), intent(in) :: schedule
+    type(column_t), allocatable :: columns(:)
+
+    call history_columns(model, columns)
+    bytes = 32.0_wp * real(size(columns), wp) * real(schedule%rows + 1, wp)
+  end function rows_on_disk
+
   !> Estimated wall clock time of the run [s], from the fastest of a few applications of the linear
-  !> operator to this model.
+  !> operator to this model, and the time for which frames keep the disk busy.
   real(wp) function estimated_seconds(model, schedule) result(seconds)
     type(model_t),    intent(inout) :: model
     type(schedule_t), intent(in) :: schedule
@@ -271,6 +305,8 @@ contains
     !> Evaluations of the forces that an increment takes until it is at rest, in soil that softens.
     real(wp), parameter :: moves = 300.0_wp
     integer,  parameter :: repetitions = 5
+    !> Opening, closing and describing a frame [s]; bytes that a disk takes in a second.
+    real(wp), parameter :: per_frame = 1.5e-3_wp, per_second = 3.0e8_wp
     real(wp), allocatable :: u(:, :), h(:, :), f(:, :)
     integer(int64) :: start, finish, rate
     integer :: k
@@ -286,6 +322,8 @@ contains
     end do
     seconds = whole_step * seconds * real(schedule%steps, wp)
     if (model%at_equilibrium) seconds = seconds * moves
+    seconds = seconds + real(size(schedule%frame_steps) + 1, wp) * per_frame &
+      + frames_on_disk(model, schedule) / per_second
   end function estimated_seconds
 
 end module pd_summary

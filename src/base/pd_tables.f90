@@ -20,6 +20,7 @@ module pd_tables
     procedure :: integral
     procedure :: largest_integral
     procedure :: first_time
+    procedure :: first_times
   end type table_t
 
 contains
@@ -184,35 +185,59 @@ contains
   end function largest_integral
 
   !> The first time at which the integral reaches a positive value; -1 where it never does.
-  !>
-  !> Between two times of the table the integral is a quadratic in time.
   pure real(wp) function first_time(self, value) result(time)
     class(table_t), intent(in) :: self
     real(wp),       intent(in) :: value
-    real(wp) :: a, b, missing, slope, curvature
-    logical  :: last
+    real(wp) :: times(1)
+
+    times = self%first_times([value])
+    time = times(1)
+  end function first_time
+
+  !> The first times at which the integral reaches positive values; -1 where it never does.
+  !>
+  !> Between two times of the table the integral is a quadratic in time.
+  pure function first_times(self, values) result(times)
+    class(table_t), intent(in) :: self
+    real(wp),       intent(in) :: values(:)
+    real(wp) :: times(size(values))
+    real(wp), allocatable :: nodes(:), reached(:), slopes(:)
+    integer :: k
+
+    nodes = [0.0_wp, pack(self%times, self%times > 0.0_wp)]
+    allocate (reached(size(nodes)), slopes(size(nodes)))
+    do k = 1, size(nodes)
+      reached(k) = self%integral(nodes(k))
+      slopes(k) = self%rate(nodes(k))
+    end do
+    do k = 1, size(values)
+      times(k) = time_reached(nodes, reached, slopes, values(k))
+    end do
+  end function first_times
+
+  !> One of them, from integrals and rates at the nodes.
+  pure real(wp) function time_reached(nodes, reached, slopes, value) result(time)
+    real(wp), intent(in) :: nodes(:), reached(:), slopes(:), value
+    real(wp) :: missing, width
+    integer  :: k
 
     time = -1.0_wp
-    a = 0.0_wp
-    do
-      b = minval(self%times, mask=self%times > a)
-      last = b >= huge(1.0_wp)
-      missing = value - self%integral(a)
-      slope = self%rate(a)
+    do k = 1, size(nodes)
+      missing = value - reached(k)
       if (missing <= 1.0e-12_wp * value) then
-        time = a
-      else if (last) then
-        if (slope > 0.0_wp) time = a + missing / slope
+        time = nodes(k)
+      else if (k == size(nodes)) then
+        if (slopes(k) > 0.0_wp) time = nodes(k) + missing / slopes(k)
       else
-        curvature = (self%rate(b) - slope) / (b - a)
-        time = a + first_root(0.5_wp * curvature, slope, -missing)
-        if (time < a .or. time > b + 1.0e-6_wp * (b - a)) time = -1.0_wp
-        time = min(time, b)
+        width = nodes(k + 1) - nodes(k)
+        time = nodes(k) + first_root(0.5_wp * ((slopes(k + 1) - slopes(k)) / width), slopes(k), &
+          -missing)
+        if (time < nodes(k) .or. time > nodes(k + 1) + 1.0e-6_wp * width) time = -1.0_wp
+        time = min(time, nodes(k + 1))
       end if
-      if (time >= 0.0_wp .or. last) return
-      a = b
+      if (time >= 0.0_wp) return
     end do
-  end function first_time
+  end function time_reached
 
   !> Smallest non-negative root of p x^2 + q x + r with r < 0; -1 where there is none.
   pure real(wp) function first_root(p, q, r) result(x)

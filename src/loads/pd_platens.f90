@@ -11,6 +11,7 @@ module pd_platens
   private
 
   public :: platens_t, new_platens, nominal_strain, time_of_strain, reference_ends
+  public :: times_of_strains
 
   type :: platens_t
     integer  :: axis = 0                     !! 1: x, 2: y, 0: there are no platens
@@ -70,15 +71,26 @@ contains
       - u(platens%points(2), platens%axis)) / platens%length
   end function nominal_strain
 
-  !> The first time at which the nominal strain reaches a value; -1 where it never does, or where
-  !> that is not known beforehand.
+  !> The first time at which the nominal strain reaches a value; -1 as below.
   pure real(wp) function time_of_strain(platens, strain) result(time)
     type(platens_t), intent(in) :: platens
     real(wp),        intent(in) :: strain
+    real(wp) :: times(1)
 
-    time = -1.0_wp
-    if (allocated(platens%strain%times)) time = platens%strain%first_time(strain)
+    times = times_of_strains(platens, [strain])
+    time = times(1)
   end function time_of_strain
+
+  !> The first times at which the nominal strain reaches values; -1 where it never does, or where
+  !> that is not known beforehand.
+  pure function times_of_strains(platens, strains) result(times)
+    type(platens_t), intent(in) :: platens
+    real(wp),        intent(in) :: strains(:)
+    real(wp) :: times(size(strains))
+
+    times = -1.0_wp
+    if (allocated(platens%strain%times)) times = platens%strain%first_times(strains)
+  end function times_of_strains
 
   !> Velocity of the affine frame of the platens at both ends: the damping acts relative to it. Zero
   !> if there are no platens.

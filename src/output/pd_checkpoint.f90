@@ -20,6 +20,7 @@ module pd_checkpoint
   private
 
   public :: checkpoint_t, write_checkpoint, read_checkpoint, checkpoint_exists, remove_checkpoints
+  public :: checkpoint_mark
 
   !> What a run needs apart from its state.
   type :: checkpoint_t
@@ -27,6 +28,7 @@ module pd_checkpoint
     type(step_limit_t) :: limit
     integer  :: history_rows = 0        !! written so far
     integer  :: frames_written = 0      !! written so far, 000000 among them
+    integer  :: rows_owed = 0, frames_owed = 0   !! due at this step, but could not be written
     character(:), allocatable :: ledger_names(:)
     real(wp),     allocatable :: ledger(:)          !! any numbers, by these names
     real(wp),     allocatable :: ledger_blocks(:, :)   !! the same, per block (blocks, numbers)
@@ -57,7 +59,7 @@ module pd_checkpoint
   end type reading_t
 
   integer, parameter :: head_length = 512
-  integer, parameter :: schema_version = 4
+  integer, parameter :: schema_version = 5
   character(*), parameter :: schema = 'perigeo checkpoint'
 
 contains
@@ -67,6 +69,14 @@ contains
 
     checkpoint_exists = any([file_exists(newest(stem)), file_exists(previous(stem))])
   end function checkpoint_exists
+
+  !> What tells the present checkpoints from others: their heads.
+  function checkpoint_mark(stem) result(mark)
+    character(*), intent(in) :: stem
+    character(2 * head_length) :: mark
+
+    mark = found_head(newest(stem))//found_head(previous(stem))
+  end function checkpoint_mark
 
   !> Remove the checkpoints of an earlier run.
   !>
@@ -107,7 +117,7 @@ contains
     call state%visit(writer)
     errors = writer%errors
     call close_file(writer%file, errors)
-    if (errors%count() == before) call patch_file(temporary, head(temporary), errors)
+    if (errors%count() == before) call patch_file(temporary, 0_i8, head(temporary), errors)
     if (errors%count() == before) call sync_file(temporary, errors)
     if (errors%count() == before) then
       if (.not. is_whole(temporary)) then
@@ -169,6 +179,8 @@ contains
     call write_attribute(file, '/', 'limit_shortest', checkpoint%limit%shortest, errors)
     call write_attribute(file, '/', 'history_rows', checkpoint%history_rows, errors)
     call write_attribute(file, '/', 'frames_written', checkpoint%frames_written, errors)
+    call write_attribute(file, '/', 'rows_owed', checkpoint%rows_owed, errors)
+    call write_attribute(file, '/', 'frames_owed', checkpoint%frames_owed, errors)
     call write_dataset(file, '/ledger_names', checkpoint%ledger_names, errors)
     call write_dataset(file, '/ledger', checkpoint%ledger, errors)
     call write_dataset(file, '/ledger_blocks', checkpoint%ledger_blocks, errors)
@@ -300,6 +312,8 @@ contains
     call read_attribute(file, '/', 'limit_shortest', checkpoint%limit%shortest, errors)
     call read_attribute(file, '/', 'history_rows', checkpoint%history_rows, errors)
     call read_attribute(file, '/', 'frames_written', checkpoint%frames_written, errors)
+    call read_attribute(file, '/', 'rows_owed', checkpoint%rows_owed, errors)
+    call read_attribute(file, '/', 'frames_owed', checkpoint%frames_owed, errors)
     call read_dataset(file, '/ledger_names', checkpoint%ledger_names, errors)
     call read_dataset(file, '/ledger', checkpoint%ledger, errors)
     call read_dataset(file, '/ledger_blocks', checkpoint%ledger_blocks, errors)
@@ -313,15 +327,25 @@ contains
   logical function is_whole(path)
     character(*), intent(in) :: path
     character(head_length) :: found
+
+    found = found_head(path)
+    is_whole = found /= ''
+    if (is_whole) is_whole = found == head(path)
+  end function is_whole
+
+  !> The first bytes of a file, '' where it cannot be read or is shorter.
+  function found_head(path) result(found)
+    character(*), intent(in) :: path
+    character(head_length) :: found
     integer :: unit, status
 
-    is_whole = .false.
+    found = ''
     open (newunit=unit, file=path, status='old', action='read', access='stream', iostat=status)
     if (status /= 0) return
     read (unit, iostat=status) found
     close (unit)
-    if (status == 0) is_whole = found == head(path)
-  end function is_whole
+    if (status /= 0) found = ''
+  end function found_head
 
   !> What the first bytes of a checkpoint should be, by the bytes that follow.
   function head(path)

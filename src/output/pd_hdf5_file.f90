@@ -14,7 +14,7 @@ module pd_hdf5_file
     h5t_native_double, h5t_str_nullpad_f, h5tcopy_f, h5tset_cset_f, h5tset_size_f, &
     h5tset_strpad_f, hid_t, hsize_t, size_t
   use pd_errors, only: error_list_t
-  use pd_system, only: set_environment
+  use pd_system, only: set_environment, wait_a_while
   implicit none
   private
 
@@ -102,20 +102,30 @@ contains
     call h5pclose_f(properties, ignored)
   end subroutine create_file
 
-  !> Open a file that exists.
+  !> Open a file that exists. For writing it is tried again for some seconds where the operating
+  !> system refuses it: a reader may hold a lock on it for a moment.
   subroutine open_file(file, path, writable, errors)
     type(hdf5_file_t),  intent(out)   :: file
     character(*),       intent(in)    :: path
     logical,            intent(in)    :: writable
     type(error_list_t), intent(inout) :: errors
-    integer :: status
+    integer, parameter :: tries = 50, pause = 100   ! [ms]
+    integer :: status, k
+    logical :: there
 
     file%path = path
     call start_library(status)
     call check(file, status, 'the HDF5 library cannot be started', errors)
     if (file%failed) return
     if (writable) then
-      call h5fopen_f(path, h5f_acc_rdwr_f, file%id, status)
+      do k = 1, tries
+        call h5fopen_f(path, h5f_acc_rdwr_f, file%id, status)
+        if (status >= 0) exit
+        inquire (file=path, exist=there)
+        if (.not. there) exit
+        if (.not. refused_by_system()) exit
+        call wait_a_while(pause)
+      end do
       call check(file, status, 'the file cannot be opened for writing', errors)
     else
       call h5fopen_f(path, h5f_acc_rdonly_f, file%id, status)
@@ -263,20 +273,36 @@ contains
     integer,            intent(in)    :: status
     character(*),       intent(in)    :: what
     type(error_list_t), intent(inout) :: errors
-    type(reason_t), target :: reason
-    integer(c_int) :: ignored
-    integer(c_int),     parameter :: innermost_first = 0
-    integer(c_int64_t), parameter :: current_stack = 0
+    type(reason_t) :: reason
 
     if (status >= 0) return
     file%failed = .true.
-    ignored = h5ewalk(current_stack, innermost_first, c_funloc(note_reason), c_loc(reason))
+    reason = last_reason()
     if (len_trim(reason%text) == 0) then
       call errors%add(what, where=file%path)
     else
       call errors%add(what//' ('//trim(reason%text)//')', where=file%path)
     end if
   end subroutine check
+
+  !> Whether the operating system has refused the last call of the library.
+  logical function refused_by_system()
+    type(reason_t) :: reason
+
+    reason = last_reason()
+    refused_by_system = reason%from_system
+  end function refused_by_system
+
+  !> Why the last call of the library has failed.
+  type(reason_t) function last_reason()
+    type(reason_t), target :: reason
+    integer(c_int) :: ignored
+    integer(c_int),     parameter :: innermost_first = 0
+    integer(c_int64_t), parameter :: current_stack = 0
+
+    ignored = h5ewalk(current_stack, innermost_first, c_funloc(note_reason), c_loc(reason))
+    last_reason = reason
+  end function last_reason
 
   !> Keep the message of the operating system where the stack holds one, otherwise the innermost.
   integer(c_int) function note_reason(level, entry, data) bind(c)

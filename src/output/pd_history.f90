@@ -6,8 +6,8 @@
 module pd_history
   use, intrinsic :: iso_fortran_env, only: iostat_end
   use pd_errors, only: error_list_t
-  use pd_files, only: close_output, flush_output, open_output, output_file_t, replace_file, &
-    write_line
+  use pd_files, only: check_in_place, close_output, flush_output, open_output, output_file_t, &
+    replace_file, write_line
   use pd_kinds, only: i8, wp
   use pd_observe, only: column_t
   use pd_system, only: remove_file
@@ -15,7 +15,7 @@ module pd_history
   implicit none
   private
 
-  public :: history_t, create_history, resume_history, write_row, close_history
+  public :: history_t, create_history, read_history, resume_history, write_row, close_history
 
   !> A history that is being written.
   type :: history_t
@@ -23,6 +23,9 @@ module pd_history
     logical, allocatable, private :: whole(:)   !! of the columns: whole numbers
     type(output_file_t), private :: file
   end type history_t
+
+  character(*), parameter :: missing = &
+    'the history of the run that is to go on is missing or cannot be read'
 
 contains
 
@@ -73,14 +76,54 @@ contains
 
     call write_line(history%file, comma_separated(values, history%whole), errors)
     call flush_output(history%file, errors)
+    call check_in_place(history%file, errors)
     if (history%file%is_open()) history%rows = history%rows + 1
   end subroutine write_row
+
+  !> The first rows of the history of a run that was cut off.
+  !>
+  !> Errors: the file is missing, has other columns or too few rows, or a row is not as it was
+  !> written.
+  subroutine read_history(stem, columns, rows, values, errors)
+    character(*),          intent(in)    :: stem
+    type(column_t),        intent(in)    :: columns(:)
+    integer,               intent(in)    :: rows          !! written up to the checkpoint
+    real(wp), allocatable, intent(out)   :: values(:, :)  !! (columns,rows)
+    type(error_list_t),    intent(inout) :: errors
+    character(:), allocatable :: line, path
+    integer :: unit, status, i, before
+
+    before = errors%count()
+    path = stem//'_history.csv'
+    allocate (values(size(columns), rows), source=0.0_wp)
+    open (newunit=unit, file=path, status='old', action='read', iostat=status)
+    if (status /= 0) then
+      call errors%add(missing, where=path)
+      return
+    end if
+    do i = 0, rows
+      call read_line(unit, line, status)
+      if (status /= 0) then
+        call report_rows(path, max(i - 1, 0), rows, errors)
+      else if (i == 0) then
+        call check_header(path, line, header(columns), errors)
+      else
+        read (line, *, iostat=status) values(:, i)
+        if (status == 0 .and. line == comma_separated(values(:, i), columns%whole_number)) cycle
+        call errors%add('row '//integer_text(i)//' is not as it was written', where=path, &
+          found=line)
+      end if
+      if (errors%count() > before) exit
+    end do
+    close (unit)
+  end subroutine read_history
 
   !> Close the history; harmless where it is not open.
   subroutine close_history(history, errors)
     type(history_t),    intent(inout) :: history
     type(error_list_t), intent(inout) :: errors
 
+    call check_in_place(history%file, errors)
     call close_output(history%file, errors)
   end subroutine close_history
 
@@ -97,19 +140,16 @@ contains
     before = errors%count()
     open (newunit=unit, file=path, status='old', action='read', iostat=status)
     if (status /= 0) then
-      call errors%add('the history of the run that is to go on is missing or cannot be read', &
-        where=path)
+      call errors%add(missing, where=path)
       return
     end if
     call open_output(short, path//'.tmp', .false., errors)
     do i = 0, rows
       call read_line(unit, line, status)
       if (status /= 0) then
-        call errors%add('has fewer rows than the checkpoint knows of', where=path, &
-          found=integer_text(max(i - 1, 0)), allowed='at least '//integer_text(rows))
-      else if (i == 0 .and. line /= header_wanted) then
-        call errors%add('has other columns than this run writes', where=path, found=line, &
-          allowed=header_wanted)
+        call report_rows(path, max(i - 1, 0), rows, errors)
+      else if (i == 0) then
+        call check_header(path, line, header_wanted, errors)
       end if
       if (errors%count() > before) exit
       call write_line(short, line, errors)
@@ -119,6 +159,23 @@ contains
     if (errors%count() == before) call replace_file(path//'.tmp', path, errors)
     if (errors%count() > before) ignored = remove_file(path//'.tmp')
   end subroutine cut_back
+
+  subroutine report_rows(path, found, rows, errors)
+    character(*),       intent(in)    :: path
+    integer,            intent(in)    :: found, rows
+    type(error_list_t), intent(inout) :: errors
+
+    call errors%add('has fewer rows than the checkpoint knows of', where=path, &
+      found=integer_text(found), allowed='at least '//integer_text(rows))
+  end subroutine report_rows
+
+  subroutine check_header(path, found, wanted, errors)
+    character(*),       intent(in)    :: path, found, wanted
+    type(error_list_t), intent(inout) :: errors
+
+    if (found /= wanted) call errors%add('has other columns than this run writes', where=path, &
+      found=found, allowed=wanted)
+  end subroutine check_header
 
   !> Read a line of any length. A last line that is not ended counts as missing.
   subroutine read_line(unit, line, status)

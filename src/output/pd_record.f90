@@ -9,7 +9,8 @@ module pd_record
   use pd_files, only: prepare_folder
   use pd_frame_fields, only: frame_fields
   use pd_geometry, only: body_t
-  use pd_history, only: close_history, create_history, history_t, resume_history, write_row
+  use pd_history, only: close_history, create_history, history_t, read_history, resume_history, &
+    write_row
   use pd_history_columns, only: history_columns
   use pd_input, only: compare_used, used_values
   use pd_input_types, only: input_t
@@ -30,7 +31,8 @@ module pd_record
 
   public :: record_t, results_in_the_way, open_record, close_record, record_row, record_frame
   public :: record_failure, record_progress, record_line, observe_state
-  public :: record_tries, save_checkpoint, load_checkpoint, same_points, same_history
+  public :: record_tries, save_checkpoint, save_last_checkpoint, load_checkpoint
+  public :: same_points, same_history
 
   !> The open outputs of a run.
   type :: record_t
@@ -43,6 +45,7 @@ module pd_record
     type(moment_t)      :: moment                !! of the last look at the state
     type(observation_t) :: seen                  !! at this moment
     integer :: frames = 0                        !! written so far, 000000 among them
+    integer :: rows_owed = 0, frames_owed = 0    !! due at this step, but could not be written
   end type record_t
 
   character(*), parameter :: ledger_names(4) = [character(24) :: 'initial_kinetic_energy', &
@@ -71,6 +74,7 @@ contains
     type(record_t),     intent(out)   :: record
     type(error_list_t), intent(inout) :: errors
     type(run_description_t) :: description
+    real(wp), allocatable :: rows(:, :)
     logical :: restart
     integer :: of_safety   ! frames of the search for the factor of safety
 
@@ -85,10 +89,13 @@ contains
     call prepare_folder(input%run%output_dir, errors)
     if (errors%count() > 0) return
     if (restart) then
+      call read_history(record%stem, record%columns, checkpoint%history_rows, rows, errors)
+      if (errors%count() > 0) return
       call resume_result(record%result, record%stem, description, &
         places_t(checkpoint%frames_written, checkpoint%history_rows), &
-        places_t(schedule%frames_left(checkpoint%clock%step) + of_safety, &
-        schedule%rows_left(checkpoint%clock%step)), checkpoint%clock%step, errors)
+        places_t(schedule%frames_left(checkpoint%clock%step) + of_safety &
+        + checkpoint%frames_owed, schedule%rows_left(checkpoint%clock%step) &
+        + checkpoint%rows_owed), checkpoint%clock%step, errors, rows)
       if (errors%count() == 0) call resume_history(record%history, record%stem, record%columns, &
         checkpoint%history_rows, errors)
       record%frames = checkpoint%frames_written
@@ -169,8 +176,8 @@ contains
     type(error_list_t), intent(inout) :: errors
 
     call close_history(record%history, errors)
-    if (errors%count() == 0) call finish_result(record%result, record%moment, errors)
     call close_progress(record%progress, errors)
+    if (errors%count() == 0) call finish_result(record%result, record%moment, errors)
   end subroutine close_record
 
   !> Observe the state after a step; what is seen stays in the record.
@@ -189,8 +196,11 @@ contains
   subroutine record_row(record, errors)
     type(record_t),     intent(inout) :: record
     type(error_list_t), intent(inout) :: errors
+    integer :: before
 
+    before = record%history%rows
     call write_row(record%history, record%seen%values, errors)
+    if (record%history%rows == before) record%rows_owed = record%rows_owed + 1
     call add_row(record%result, record%seen%values, errors)
   end subroutine record_row
 
@@ -200,9 +210,15 @@ contains
     type(state_t),      intent(in)    :: state
     type(record_t),     intent(inout) :: record
     type(error_list_t), intent(inout) :: errors
+    integer :: before
 
+    before = errors%count()
     call write_frame(record%result, record%frames, record%moment, model, state, errors)
-    record%frames = record%frames + 1
+    if (errors%count() == before) then
+      record%frames = record%frames + 1
+    else
+      record%frames_owed = record%frames_owed + 1
+    end if
   end subroutine record_frame
 
   !> Write the tries of a search for the factor of safety.
@@ -270,16 +286,51 @@ contains
     type(step_limit_t), intent(in)    :: limit
     type(record_t),     intent(inout) :: record
     type(error_list_t), intent(inout) :: errors
-    type(checkpoint_t) :: checkpoint
     integer :: before
 
     before = errors%count()
     call write_rows(record%result, errors)
-    if (errors%count() > before) return
+    if (errors%count() == before) call put_checkpoint(model, state, ledger, clock, limit, record, &
+      errors)
+  end subroutine save_checkpoint
+
+  !> Write a last checkpoint where a file cannot be written: a restart writes what is owed. It takes
+  !> the rows that the result file lacks from the CSV file. Nothing is written where another run
+  !> has taken the place of this one.
+  subroutine save_last_checkpoint(model, state, ledger, clock, limit, record, errors)
+    type(model_t),      intent(in)    :: model
+    type(state_t),      intent(inout) :: state   !! visited, not changed
+    type(ledger_t),     intent(in)    :: ledger
+    type(clock_t),      intent(in)    :: clock
+    type(step_limit_t), intent(in)    :: limit
+    type(record_t),     intent(inout) :: record
+    type(error_list_t), intent(inout) :: errors
+    type(error_list_t) :: known
+
+    if (.not. record%result%is_lost) call write_rows(record%result, known)
+    if (record%result%is_foreign) then
+      call errors%add('no checkpoint is written: another run writes these files')
+    else
+      call put_checkpoint(model, state, ledger, clock, limit, record, errors)
+    end if
+  end subroutine save_last_checkpoint
+
+  subroutine put_checkpoint(model, state, ledger, clock, limit, record, errors)
+    type(model_t),      intent(in)    :: model
+    type(state_t),      intent(inout) :: state   !! visited, not changed
+    type(ledger_t),     intent(in)    :: ledger
+    type(clock_t),      intent(in)    :: clock
+    type(step_limit_t), intent(in)    :: limit
+    type(record_t),     intent(inout) :: record
+    type(error_list_t), intent(inout) :: errors
+    type(checkpoint_t) :: checkpoint
+
     checkpoint%clock = clock
     checkpoint%limit = limit
     checkpoint%history_rows = record%history%rows
     checkpoint%frames_written = record%frames
+    checkpoint%rows_owed = record%rows_owed
+    checkpoint%frames_owed = record%frames_owed
     checkpoint%ledger_names = ledger_names
     checkpoint%ledger = [ledger%initial_kinetic_energy, ledger%initial_strain_energy, &
       ledger%largest_work, ledger%outer_work]
@@ -291,7 +342,7 @@ contains
     checkpoint%input = record%values
     call points_of(model, checkpoint%position, checkpoint%volume, checkpoint%boundary)
     call write_checkpoint(record%stem, checkpoint, state, model%shown%row, errors)
-  end subroutine save_checkpoint
+  end subroutine put_checkpoint
 
   !> Read the newest checkpoint and compare its input with the present one. The state has one row
   !> per point.

@@ -17,13 +17,16 @@ module pd_result
   use pd_labels, only: label_t
   use pd_model, only: model_t
   use pd_observe, only: column_t, moment_t
-  use pd_rows, only: check_rows, copy_rows, put_rows, reserve_rows, resize_rows
-  use pd_run_description, only: run_description_t, schema, schema_version, write_description
+  use pd_rows, only: check_rows, compare_rows, copy_rows, put_rows, reserve_rows, resize_rows, &
+    rows_in
+  use pd_run_description, only: run_description_t, schema, schema_version, write_description, &
+    writer_of
   use pd_state, only: state_t
   use pd_system, only: remove_file
+  use pd_text, only: integer_text
   use pd_timing, only: now
   use pd_tries, only: tries_t
-  use pd_xdmf, only: write_xdmf, xdmf_grid
+  use pd_xdmf, only: new_xdmf, xdmf_t
   implicit none
   private
 
@@ -43,15 +46,16 @@ module pd_result
 
   !> A result file of a run that is going on; the file itself is closed between calls.
   type :: result_t
-    character(:), allocatable :: path, xdmf_path
+    character(:), allocatable :: path
     integer :: n = 0                   !! points
     type(places_t) :: places           !! in the file
     type(frame_field_t), allocatable :: fields(:)
     type(column_t),      allocatable :: columns(:)
     logical :: has_strain = .false.    !! whether there are platens
-    logical :: yields = .false.        !! whether the points have a yield stress
-    integer :: written = 0             !! frames written so far
-    character(:), allocatable :: grids !! of these frames, for the XDMF file
+    type(xdmf_t) :: xdmf               !! the file for ParaView
+    character(:), allocatable :: writer   !! which run wrote the file: this one
+    logical :: is_foreign = .false.    !! another one has been found in its place
+    logical :: is_lost = .false.       !! it could not be opened
     integer :: rows_written = 0
     integer,  private :: waiting = 0                   !! rows not written yet
     real(wp), private :: waiting_since = 0.0_wp        !! clock at the first of these rows [s]
@@ -87,9 +91,12 @@ contains
   !> Go on with the result file of a run that was cut off: a new file with the first frames and rows
   !> of the old one and space for more replaces it.
   !>
+  !> `rows`: those of the CSV file, which may have some that the old result file has not; absent:
+  !> those of the old file.
   !> Errors: no such file, another set of points, other columns, fewer frames or rows than the
-  !> checkpoint knows of, or the files cannot be written. The old file is then as it was.
-  subroutine resume_result(result, stem, description, kept, more, step, errors)
+  !> checkpoint knows of, rows that differ, or the files cannot be written. The old file is then as
+  !> it was.
+  subroutine resume_result(result, stem, description, kept, more, step, errors, rows)
     type(result_t),          intent(out)   :: result
     character(*),            intent(in)    :: stem
     type(run_description_t), intent(in)    :: description
@@ -97,6 +104,7 @@ contains
     type(places_t),          intent(in)    :: more
     integer,                 intent(in)    :: step   !! of the checkpoint
     type(error_list_t),      intent(inout) :: errors
+    real(wp),                intent(in), optional :: rows(:, :)   !! (columns,rows)
     type(hdf5_file_t) :: old, new
     type(moment_t) :: moment
     integer :: i, before
@@ -106,14 +114,22 @@ contains
       kept%rows + more%rows))
     call open_file(old, result%path, .false., errors)
     call check_old_frames(old, result%path, kept%frames, step, errors)
-    if (errors%count() == before) call check_rows(old, result%columns, kept%rows, errors)
+    if (present(rows)) then
+      if (errors%count() == before) call compare_rows(old, result%columns, rows, errors)
+    else
+      if (errors%count() == before) call check_rows(old, result%columns, kept%rows, errors)
+    end if
     if (errors%count() == before) then
       call create_structure(result, new, description, errors)
       do i = 0, kept%frames - 1
         call copy_frame(old, new, frame_name(i), result%n, result%fields, moment, errors)
-        call note_frame(result, i, moment%time)
+        call result%xdmf%note(moment%time)
       end do
-      call copy_rows(old, new, result%columns, kept%rows, errors)
+      if (present(rows)) then
+        call put_rows(new, result%columns, 0, rows, errors)
+      else
+        call copy_rows(old, new, result%columns, kept%rows, errors)
+      end if
       result%rows_written = kept%rows
     end if
     call close_file(old, errors)
@@ -150,12 +166,39 @@ contains
     type(error_list_t), intent(inout) :: errors
     type(hdf5_file_t) :: file
 
-    call open_file(file, result%path, .true., errors)
+    call open_own(result, file, errors)
     call put_waiting_rows(result, file, errors)
     result%places%rows = 2 * result%places%rows + bunch
     call resize_rows(file, result%columns, result%rows_written, result%places%rows, errors)
     call close_file(file, errors)
   end subroutine make_room
+
+  !> Open the file for writing, and look whether it is the one that this run has made.
+  !>
+  !> Errors: it is gone, or another one is in its place.
+  subroutine open_own(result, file, errors)
+    type(result_t),     intent(inout) :: result
+    type(hdf5_file_t),  intent(inout) :: file
+    type(error_list_t), intent(inout) :: errors
+    character(:), allocatable :: found
+    integer :: rows
+
+    call open_file(file, result%path, .true., errors)
+    found = writer_of(file, errors)
+    rows = rows_in(file, errors)
+    result%is_lost = .not. file%is_good()
+    if (result%is_lost) return
+    if (found == result%writer .and. rows == result%rows_written) return
+    result%is_foreign = found /= result%writer
+    if (result%is_foreign) then
+      call errors%add('another file has taken the place of the result of this run', &
+        where=result%path, found=found, allowed=result%writer)
+    else
+      call errors%add('the result has lost rows of its history', where=result%path, &
+        found=integer_text(rows), allowed=integer_text(result%rows_written))
+    end if
+    file%failed = .true.
+  end subroutine open_own
 
   !> Write the rows that wait.
   !>
@@ -166,7 +209,7 @@ contains
     type(hdf5_file_t) :: file
 
     if (result%waiting == 0) return
-    call open_file(file, result%path, .true., errors)
+    call open_own(result, file, errors)
     call put_waiting_rows(result, file, errors)
     call close_file(file, errors)
   end subroutine write_rows
@@ -184,7 +227,8 @@ contains
     result%waiting = 0
   end subroutine put_waiting_rows
 
-  !> Write frame `index` (0: the unloaded state) and the rows that wait, and renew the XDMF file.
+  !> Write frame `index` (0: the unloaded state) and the rows that wait, and add the frame to the
+  !> XDMF file.
   !>
   !> Errors: a file cannot be written; the frames before this one stay readable.
   subroutine write_frame(result, index, moment, model, state, errors)
@@ -202,14 +246,13 @@ contains
       call errors%add('there is no place for frame '//frame_name(index), where=result%path)
       return
     end if
-    call open_file(file, result%path, .true., errors)
+    call open_own(result, file, errors)
     call put_waiting_rows(result, file, errors)
     call put_frame(file, frame_name(index), result%fields, model, state, errors)
     call mark_frame(file, frame_name(index), with_strain(result, moment), .true., errors)
     call close_file(file, errors)
     if (errors%count() > before) return
-    call note_frame(result, index, moment%time)
-    call renew_xdmf(result, errors)
+    call result%xdmf%add_frame(moment%time, errors)
   end subroutine write_frame
 
   !> Write the state in which a run failed, marked as not valid, beside the frames, and the rows
@@ -224,7 +267,7 @@ contains
     type(error_list_t), intent(inout) :: errors
     type(hdf5_file_t) :: file
 
-    call open_file(file, result%path, .true., errors)
+    call open_own(result, file, errors)
     call put_waiting_rows(result, file, errors)
     call put_frame(file, '/failed_frame', result%fields, model, state, errors)
     call mark_frame(file, '/failed_frame', with_strain(result, moment), .false., errors)
@@ -239,7 +282,7 @@ contains
     character(*), parameter :: group = '/strength_reduction'
     type(hdf5_file_t) :: file
 
-    call open_file(file, result%path, .true., errors)
+    call open_own(result, file, errors)
     call create_group(file, group, errors)
     call write_attribute(file, group, 'borne', tries%least(), errors)
     call write_attribute(file, group, 'not_borne', tries%most(), errors)
@@ -266,21 +309,28 @@ contains
 
   !> Write the rows that wait, and mark the result as complete: the run has come to its end. Only
   !> now are the number of steps and of rows known for sure, for the time step may have changed.
+  !>
+  !> Errors: a file cannot be written; the result is not complete then.
   subroutine finish_result(result, moment, errors)
     type(result_t),     intent(inout) :: result
     type(moment_t),     intent(in)    :: moment   !! the end
     type(error_list_t), intent(inout) :: errors
     type(hdf5_file_t) :: file
+    integer :: before
 
-    call open_file(file, result%path, .true., errors)
+    before = errors%count()
+    call open_own(result, file, errors)
     call put_waiting_rows(result, file, errors)
     if (result%rows_written < result%places%rows) &
       call resize_rows(file, result%columns, result%rows_written, result%rows_written, errors)
     call write_attribute(file, '/', 'steps', moment%step, errors)
     call write_attribute(file, '/', 'time_step', moment%time_step, errors)
+    call close_file(file, errors)
+    call result%xdmf%finish(errors)
+    if (errors%count() > before) return
+    call open_own(result, file, errors)
     call write_attribute(file, '/', 'complete', 1, errors)
     call close_file(file, errors)
-    call renew_xdmf(result, errors)
   end subroutine finish_result
 
   subroutine describe_result(result, stem, description, places)
@@ -290,20 +340,19 @@ contains
     type(places_t),          intent(in)    :: places
 
     result%path = stem//'.h5'
-    result%xdmf_path = stem//'.xdmf'
     result%n = size(description%volume)
     result%places = places
     result%fields = description%fields
     result%columns = description%columns
     allocate (result%bunch_of(size(result%columns), bunch))
     result%has_strain = description%strain_axis /= 'none'
-    result%yields = allocated(description%yield_stress)
-    result%grids = ''
+    result%xdmf = new_xdmf(stem//'.xdmf', result%path, result%n, result%fields%field_label_t, &
+      places%frames, allocated(description%yield_stress))
   end subroutine describe_result
 
   !> Write everything but the contents of frames and rows, under the name of a temporary file.
   subroutine create_structure(result, file, description, errors)
-    type(result_t),          intent(in)    :: result
+    type(result_t),          intent(inout) :: result
     type(hdf5_file_t),       intent(inout) :: file
     type(run_description_t), intent(in)    :: description
     type(error_list_t),      intent(inout) :: errors
@@ -311,6 +360,7 @@ contains
 
     call create_file(file, result%path//'.tmp', 0, errors)
     call write_description(file, description, result%places%frames, errors)
+    result%writer = writer_of(file, errors)
     call reserve_rows(file, result%columns, result%places%rows, errors)
     call create_group(file, '/frames', errors)
     do i = 0, result%places%frames - 1
@@ -322,7 +372,7 @@ contains
 
   !> Close the finished file, give it its name, and write the XDMF file that belongs to it.
   subroutine publish(result, file, errors)
-    type(result_t),     intent(in)    :: result
+    type(result_t),     intent(inout) :: result
     type(hdf5_file_t),  intent(inout) :: file
     type(error_list_t), intent(inout) :: errors
     integer :: before
@@ -333,7 +383,7 @@ contains
     call close_file(file, errors)
     if (good .and. errors%count() == before) then
       call replace_file(result%path//'.tmp', result%path, errors)
-      if (errors%count() == before) call renew_xdmf(result, errors)
+      if (errors%count() == before) call result%xdmf%write(errors)
     else
       call discard(result, file)
     end if
@@ -380,23 +430,6 @@ contains
       return
     end do
   end subroutine check_old_frames
-
-  subroutine note_frame(result, index_of_frame, time)
-    type(result_t), intent(inout) :: result
-    integer,        intent(in)    :: index_of_frame
-    real(wp),       intent(in)    :: time
-
-    result%written = result%written + 1
-    result%grids = result%grids//xdmf_grid(result%path(index(result%path, '/', back=.true.) + 1:), &
-      result%n, result%fields%field_label_t, index_of_frame, time, result%yields)
-  end subroutine note_frame
-
-  subroutine renew_xdmf(result, errors)
-    type(result_t),     intent(in)    :: result
-    type(error_list_t), intent(inout) :: errors
-
-    call write_xdmf(result%xdmf_path, result%grids, errors)
-  end subroutine renew_xdmf
 
   !> The moment with the nominal strain to be written: NaN where there are no platens.
   function with_strain(result, moment) result(written)

@@ -5,17 +5,18 @@
 !> operating system, then `written`, the number of valid rows. A kill at any moment loses at most
 !> the rows of the last bunch.
 module pd_rows
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
   use pd_errors, only: error_list_t
   use pd_frames, only: write_label
   use pd_hdf5, only: create_group, flush_file, hdf5_file_t, overwrite_part, read_attribute, &
     read_dataset, remove_object, reserve_dataset, reserve_whole_numbers, write_attribute
   use pd_kinds, only: wp
   use pd_observe, only: column_t
-  use pd_text, only: integer_text
+  use pd_text, only: integer_text, number_text
   implicit none
   private
 
-  public :: reserve_rows, put_rows, check_rows, copy_rows, resize_rows
+  public :: reserve_rows, put_rows, check_rows, compare_rows, copy_rows, resize_rows, rows_in
 
   character(*), parameter :: group = '/history'
 
@@ -88,6 +89,48 @@ contains
         where=file%path, found=integer_text(written), allowed='at least '//integer_text(n))
     end if
   end subroutine check_rows
+
+  !> Rows that are in a file.
+  integer function rows_in(file, errors) result(rows)
+    type(hdf5_file_t),  intent(inout) :: file
+    type(error_list_t), intent(inout) :: errors
+
+    rows = 0
+    call read_attribute(file, group, 'written', rows, errors)
+  end function rows_in
+
+  !> Report an error unless the rows of a file are the given ones, as far as it has them: the same
+  !> numbers stand in the CSV file, and damage shows.
+  subroutine compare_rows(file, columns, rows, errors)
+    type(hdf5_file_t),  intent(inout) :: file
+    type(column_t),     intent(in)    :: columns(:)
+    real(wp),           intent(in)    :: rows(:, :)   !! (columns,rows)
+    type(error_list_t), intent(inout) :: errors
+    real(wp), allocatable :: values(:)
+    integer :: n, i, k, before
+
+    before = errors%count()
+    call check_rows(file, columns, 0, errors)
+    if (errors%count() > before) return
+    n = min(rows_in(file, errors), size(rows, 2))
+    do k = 1, size(columns)
+      call read_dataset(file, place_of(columns(k)), values, errors)
+      if (.not. file%is_good()) return
+      do i = 1, n
+        if (same_number(values(i), rows(k, i))) cycle
+        call errors%add('row '//integer_text(i)//' of '//trim(columns(k)%name)//' is not that '// &
+          'of the CSV file: one of the two is damaged', where=file%path, &
+          found=number_text(values(i)), allowed=number_text(rows(k, i)))
+        return
+      end do
+    end do
+  end subroutine compare_rows
+
+  pure logical function same_number(a, b) result(same)
+    real(wp), intent(in) :: a, b
+
+    same = abs(a - b) <= 0.0_wp .or. (ieee_is_nan(a) .and. ieee_is_nan(b))
+  end function same_number
 
   !> Copy the first n rows from one result file into another.
   subroutine copy_rows(old, new, columns, n, errors)

@@ -3,15 +3,16 @@ module pd_run_description
   use pd_errors, only: error_list_t
   use pd_frame_fields, only: frame_field_t
   use pd_frames, only: write_label
-  use pd_hdf5, only: create_group, hdf5_file_t, write_attribute, write_dataset
+  use pd_hdf5, only: create_group, hdf5_file_t, read_attribute, write_attribute, write_dataset
   use pd_kinds, only: wp
   use pd_labels, only: label_t
   use pd_observe, only: column_t
-  use pd_system, only: host_name
+  use pd_system, only: host_name, process_number
+  use pd_text, only: integer_text
   implicit none
   private
 
-  public :: provenance_t, run_description_t, write_description, utc_time
+  public :: provenance_t, run_description_t, write_description, writer_of, utc_time
   public :: schema, schema_version
 
   integer, parameter :: schema_version = 2
@@ -71,10 +72,25 @@ contains
     call write_attribute(file, '/', 'flags', provenance%flags, errors)
     call write_attribute(file, '/', 'command_line', provenance%command_line, errors)
     call write_attribute(file, '/', 'host', host_name(), errors)
+    call write_attribute(file, '/', 'process', process_number(), errors)
     call write_attribute(file, '/', 'threads', provenance%threads, errors)
     call write_attribute(file, '/', 'created', utc_time(), errors)
     call write_attribute(file, '/', 'complete', 0, errors)
   end subroutine write_provenance
+
+  !> Which run wrote a file: host, process, and when.
+  function writer_of(file, errors) result(writer)
+    type(hdf5_file_t),  intent(inout) :: file
+    type(error_list_t), intent(inout) :: errors
+    character(:), allocatable :: writer, host, created
+    integer :: process
+
+    writer = ''
+    call read_attribute(file, '/', 'host', host, errors)
+    call read_attribute(file, '/', 'process', process, errors)
+    call read_attribute(file, '/', 'created', created, errors)
+    if (file%is_good()) writer = 'process '//integer_text(process)//' on '//host//', '//created
+  end function writer_of
 
   subroutine write_attributes(file, description, n_frames, errors)
     type(hdf5_file_t),       intent(inout) :: file

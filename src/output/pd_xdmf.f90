@@ -3,64 +3,163 @@
 !> It holds no numbers, only their paths in the HDF5 file, which is named without a folder so that
 !> both can be moved together. Vectors in the plane get a third component 0, which ParaView's
 !> filters (warp, glyph) ask for; tensors become one scalar per component.
+!>
+!> Behind its end there is room for all frames, in blanks, which XML ignores there. A frame is
+!> written over the end, with a new end behind it, in one call of the operating system: the cost of
+!> a frame does not depend on how many there are, and the disk cannot be full.
 module pd_xdmf
   use pd_errors, only: error_list_t
-  use pd_files, only: write_whole_file
-  use pd_kinds, only: wp
+  use pd_files, only: cut_file, open_output, output_file_t, patch_file, publish_output, &
+    size_of_file, write_line
+  use pd_kinds, only: i8, wp
   use pd_labels, only: field_label_t
   use pd_text, only: integer_text
   implicit none
   private
 
-  public :: xdmf_grid, write_xdmf
+  public :: xdmf_t, new_xdmf
 
   character(*), parameter :: nl = new_line('a')
+  character(*), parameter :: head = '<?xml version="1.0" ?>'//nl//'<Xdmf Version="2.0">'//nl// &
+    '<Domain>'//nl//'<Grid Name="frames" GridType="Collection" CollectionType="Temporal">'//nl
+  character(*), parameter :: tail = '</Grid>'//nl//'</Domain>'//nl//'</Xdmf>'//nl
+
+  !> The XDMF file of a result that is being written.
+  type :: xdmf_t
+    private
+    character(:), allocatable :: path, data_file
+    integer :: n = 0                     !! points
+    type(field_label_t), allocatable :: fields(:)
+    logical :: yields = .false.          !! the points have a yield stress
+    integer :: frames = 0                !! so far
+    real(wp), allocatable :: times(:)    !! of the frames for which there is room [s]
+    integer(i8) :: filled = 0            !! bytes up to the end of the last frame
+    integer(i8) :: bytes = -1            !! of the file
+  contains
+    procedure :: note
+    procedure :: write => write_xdmf
+    procedure :: add_frame
+    procedure :: finish
+    procedure, private :: grid_of
+  end type xdmf_t
 
 contains
 
-  !> Write the XDMF file of a result anew, from the grids of its frames one after the other.
+  !> The XDMF file that belongs to a result file, without frames.
+  type(xdmf_t) function new_xdmf(path, data_path, n, fields, room, yields) result(xdmf)
+    character(*),        intent(in) :: path, data_path   !! of this file, of the result file
+    integer,             intent(in) :: n                 !! number of points
+    type(field_label_t), intent(in) :: fields(:)
+    integer,             intent(in) :: room              !! frames that will come
+    logical,             intent(in) :: yields            !! the points have a yield stress
+
+    xdmf%path = path
+    xdmf%data_file = data_path(index(data_path, '/', back=.true.) + 1:)
+    xdmf%n = n
+    xdmf%fields = fields
+    xdmf%yields = yields
+    allocate (xdmf%times(room))
+  end function new_xdmf
+
+  !> Take note of the next frame; the file stays as it is.
+  subroutine note(self, time)
+    class(xdmf_t), intent(inout) :: self
+    real(wp),      intent(in)    :: time   !! [s]
+
+    self%frames = self%frames + 1
+    self%times(self%frames) = time
+  end subroutine note
+
+  !> Write the whole file anew, beside its name, and put it in place.
   !>
   !> Errors: it cannot be written or put in place.
-  subroutine write_xdmf(path, grids, errors)
-    character(*),       intent(in)    :: path, grids
+  subroutine write_xdmf(self, errors)
+    class(xdmf_t),      intent(inout) :: self
     type(error_list_t), intent(inout) :: errors
+    type(output_file_t) :: file
+    character(:), allocatable :: text
+    integer :: k, before
 
-    call write_whole_file(path, '<?xml version="1.0" ?>'//nl//'<Xdmf Version="2.0">'//nl &
-      //'<Domain>'//nl//'<Grid Name="frames" GridType="Collection" CollectionType="Temporal">' &
-      //nl//grids//'</Grid>'//nl//'</Domain>'//nl//'</Xdmf>', errors)
+    before = errors%count()
+    self%bytes = -1
+    call open_output(file, self%path//'.tmp', .false., errors)
+    call write_line(file, head(:len(head) - 1), errors)
+    self%filled = len(head)
+    text = self%grid_of(0, 0.0_wp)
+    do k = 1, self%frames
+      text = self%grid_of(k - 1, self%times(k))
+      call write_line(file, text(:len(text) - 1), errors)
+      self%filled = self%filled + len(text)
+    end do
+    call write_line(file, tail(:len(tail) - 1), errors)
+    do k = self%frames + 1, size(self%times)
+      call write_line(file, repeat(' ', len(text) - 1), errors)
+    end do
+    call publish_output(file, self%path, errors)
+    if (errors%count() == before) self%bytes = size_of_file(self%path)
   end subroutine write_xdmf
 
+  !> Add a frame in place. The file is written anew where it is not what was written.
+  !>
+  !> Errors: it cannot be written.
+  subroutine add_frame(self, time, errors)
+    class(xdmf_t),      intent(inout) :: self
+    real(wp),           intent(in)    :: time   !! [s]
+    type(error_list_t), intent(inout) :: errors
+    character(:), allocatable :: text
+
+    call self%note(time)
+    text = self%grid_of(self%frames - 1, time)
+    if (size_of_file(self%path) == self%bytes &
+      .and. self%filled + len(text) + len(tail) <= self%bytes) then
+      call patch_file(self%path, self%filled, text//tail, errors)
+      self%filled = self%filled + len(text)
+    else
+      call self%write(errors)
+    end if
+  end subroutine add_frame
+
+  !> Give back the room that is left.
+  !>
+  !> Errors: the file cannot be written.
+  subroutine finish(self, errors)
+    class(xdmf_t),      intent(inout) :: self
+    type(error_list_t), intent(inout) :: errors
+
+    if (size_of_file(self%path) /= self%bytes) call self%write(errors)
+    if (self%bytes >= 0) call cut_file(self%path, self%filled + len(tail), errors)
+  end subroutine finish
+
   !> The grid of one frame.
-  pure function xdmf_grid(data_file, n, fields, index_of_frame, at_time, yields) result(text)
-    character(*),  intent(in) :: data_file        !! name of the HDF5 file, without its folder
-    integer,       intent(in) :: n                !! number of points
-    type(field_label_t), intent(in) :: fields(:)
+  pure function grid_of(self, index_of_frame, at_time) result(text)
+    class(xdmf_t), intent(in) :: self
     integer,       intent(in) :: index_of_frame   !! k of /frames/k, written with six digits
     real(wp),      intent(in) :: at_time          !! [s]
-    logical,       intent(in) :: yields           !! the points have a yield stress
-    character(:), allocatable :: text, source
+    character(:), allocatable :: text, source, n
     character(24) :: time
     character(6)  :: group
     integer :: i
 
+    n = integer_text(self%n)
     write (time, '(es24.16e3)') at_time
     write (group, '(i6.6)') index_of_frame
-    source = escaped(data_file)//':/points/'
+    source = escaped(self%data_file)//':/points/'
     text = '<Grid Name="'//group//'" GridType="Uniform">'//nl &
       //'<Time Value="'//trim(adjustl(time))//'"/>'//nl &
-      //'<Topology TopologyType="Polyvertex" NodesPerElement="1" NumberOfElements="' &
-      //integer_text(n)//'"/>'//nl//'<Geometry GeometryType="XY">'//nl &
-      //whole_item(source//'position', integer_text(n)//' 2', 'Float', 8)//'</Geometry>'//nl &
-      //attribute('volume', 'Scalar', whole_item(source//'volume', integer_text(n), 'Float', 8)) &
-      //attribute('boundary', 'Scalar', whole_item(source//'boundary', integer_text(n), 'Int', 4))
-    if (yields) text = text//attribute('yield_stress', 'Scalar', &
-      whole_item(source//'yield_stress', integer_text(n), 'Float', 8))
-    source = escaped(data_file)//':/frames/'//group//'/'
-    do i = 1, size(fields)
-      text = text//field_text(source//trim(fields(i)%name), n, fields(i))
+      //'<Topology TopologyType="Polyvertex" NodesPerElement="1" NumberOfElements="'//n &
+      //'"/>'//nl//'<Geometry GeometryType="XY">'//nl &
+      //whole_item(source//'position', n//' 2', 'Float', 8)//'</Geometry>'//nl &
+      //attribute('volume', 'Scalar', whole_item(source//'volume', n, 'Float', 8)) &
+      //attribute('boundary', 'Scalar', whole_item(source//'boundary', n, 'Int', 4))
+    if (self%yields) text = text//attribute('yield_stress', 'Scalar', &
+      whole_item(source//'yield_stress', n, 'Float', 8))
+    source = escaped(self%data_file)//':/frames/'//group//'/'
+    do i = 1, size(self%fields)
+      text = text//field_text(source//trim(self%fields(i)%name), self%n, &
+        self%fields(i))
     end do
     text = text//'</Grid>'//nl
-  end function xdmf_grid
+  end function grid_of
 
   pure function field_text(source, n, field) result(text)
     character(*),  intent(in) :: source

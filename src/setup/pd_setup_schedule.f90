@@ -5,7 +5,7 @@ module pd_setup_schedule
   use pd_input_types, only: input_t, integration_input_t
   use pd_kinds, only: is_set, wp
   use pd_model, only: model_t
-  use pd_platens, only: time_of_strain
+  use pd_platens, only: times_of_strains
   use pd_schedule, only: new_schedule, schedule_t
   use pd_stability, only: find_highest_frequency
   implicit none
@@ -31,16 +31,13 @@ contains
 
     end_time = input%integration%end_time
     if (is_set(input%integration%final_strain)) &
-      end_time = strain_time(input%integration%final_strain)
+      end_time = sum(strain_times([input%integration%final_strain]))
     if (errors%count() > 0) return
     call choose_time_step(input%integration, end_time, model, clock%time_step)
 
     associate (given => input%output)
       if (size(given%frame_strains) > 0) then
-        allocate (frame_times(size(given%frame_strains)))
-        do k = 1, size(frame_times)
-          frame_times(k) = strain_time(given%frame_strains(k))
-        end do
+        frame_times = strain_times(given%frame_strains)
       else if (size(given%frame_times) > 0) then
         allocate (frame_times(size(given%frame_times)), source=given%frame_times)
       else
@@ -60,17 +57,21 @@ contains
 
   contains
 
-    !> Time at which the nominal strain reaches a value.
-    real(wp) function strain_time(strain) result(time)
-      real(wp), intent(in) :: strain
+    !> Times at which the nominal strain reaches values.
+    function strain_times(strains) result(times)
+      real(wp), intent(in) :: strains(:)
+      real(wp) :: times(size(strains))
       character(24) :: text
+      integer :: i
 
-      time = time_of_strain(model%platens, strain)
-      if (time > 0.0_wp) return
-      write (text, '(g0.6)') strain
-      call errors%add('the motion of the platens never reaches a nominal strain', &
-        '&integration final_strain or &output frame_strains', trim(text))
-    end function strain_time
+      times = times_of_strains(model%platens, strains)
+      do i = 1, size(strains)
+        if (times(i) > 0.0_wp) cycle
+        write (text, '(g0.6)') strains(i)
+        call errors%add('the motion of the platens never reaches a nominal strain', &
+          '&integration final_strain or &output frame_strains', trim(text))
+      end do
+    end function strain_times
 
   end subroutine set_up_schedule
 

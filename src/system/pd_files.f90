@@ -3,15 +3,20 @@
 !> Not through Fortran's own units: the run-time library of gfortran keeps the errors of FLUSH and
 !> CLOSE to itself, so that a full disk goes unnoticed. Every return code is checked here.
 module pd_files
-  use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_int, c_null_char, c_null_ptr, &
+  use, intrinsic :: iso_c_binding, only: c_associated, c_int, c_long, c_null_char, c_null_ptr, &
     c_ptr, c_size_t
+  use pd_c_files, only: c_fclose, c_fflush, c_fileno, c_fopen, c_fsync, c_fwrite, c_pwrite, &
+    c_truncate
   use pd_errors, only: error_list_t
+  use pd_kinds, only: i8
   use pd_system, only: make_directories, remove_file, rename_file
   implicit none
   private
 
-  public :: output_file_t, open_output, write_line, flush_output, close_output
-  public :: replace_file, sync_file, patch_file, write_whole_file, prepare_folder, file_exists
+  public :: output_file_t, open_output, write_line, flush_output, check_in_place
+  public :: close_output
+  public :: replace_file, sync_file, patch_file, cut_file, size_of_file, publish_output
+  public :: prepare_folder, file_exists
 
   !> A text file that is being written. After the first failure nothing more is written to it and
   !> nothing more is reported.
@@ -19,39 +24,11 @@ module pd_files
     private
     type(c_ptr) :: stream = c_null_ptr
     character(:), allocatable :: path
+    integer(i8) :: bytes = 0        !! written so far, those before an opening among them
     logical :: failed = .false.
   contains
     procedure :: is_open
   end type output_file_t
-
-  interface
-    type(c_ptr) function c_fopen(path, mode) bind(c, name='fopen')
-      import :: c_char, c_ptr
-      character(kind=c_char), intent(in) :: path(*), mode(*)
-    end function c_fopen
-    integer(c_size_t) function c_fwrite(text, item, count, stream) bind(c, name='fwrite')
-      import :: c_char, c_ptr, c_size_t
-      character(kind=c_char), intent(in) :: text(*)
-      integer(c_size_t), value :: item, count
-      type(c_ptr), value :: stream
-    end function c_fwrite
-    integer(c_int) function c_fflush(stream) bind(c, name='fflush')
-      import :: c_int, c_ptr
-      type(c_ptr), value :: stream
-    end function c_fflush
-    integer(c_int) function c_fclose(stream) bind(c, name='fclose')
-      import :: c_int, c_ptr
-      type(c_ptr), value :: stream
-    end function c_fclose
-    integer(c_int) function c_fileno(stream) bind(c, name='fileno')
-      import :: c_int, c_ptr
-      type(c_ptr), value :: stream
-    end function c_fileno
-    integer(c_int) function c_fsync(descriptor) bind(c, name='fsync')
-      import :: c_int
-      integer(c_int), value :: descriptor
-    end function c_fsync
-  end interface
 
 contains
 
@@ -70,13 +47,16 @@ contains
     character(*),        intent(in)    :: path
     logical,             intent(in)    :: append
     type(error_list_t),  intent(inout) :: errors
+    integer(c_int) :: ignored
 
     file%path = path
-    if (append) then
-      file%stream = c_fopen(path//c_null_char, 'ab'//c_null_char)
-    else
+    if (append) file%bytes = max(0_i8, size_of_file(path))
+    if (.not. append) then
       file%stream = c_fopen(path//c_null_char, 'wb'//c_null_char)
+      if (c_associated(file%stream)) ignored = c_fclose(file%stream)
     end if
+    ! always behind what is there: a file that someone cuts off gets no hole
+    file%stream = c_fopen(path//c_null_char, 'ab'//c_null_char)
     if (c_associated(file%stream)) return
     file%failed = .true.
     call errors%add('cannot be opened for writing: is the folder there, is writing permitted, ' &
@@ -95,6 +75,7 @@ contains
     if (c_fwrite(text//new_line('a'), 1_c_size_t, length, file%stream) /= length) then
       call report_write(file, errors)
     end if
+    file%bytes = file%bytes + int(length, i8)
   end subroutine write_line
 
   !> Hand everything written so far to the operating system.
@@ -105,6 +86,19 @@ contains
     if (.not. file%is_open()) return
     if (c_fflush(file%stream) /= 0) call report_write(file, errors)
   end subroutine flush_output
+
+  !> Report an error where the file is no longer under its name: it was removed, replaced or changed
+  !> by someone else while it was being written. Everything must have been handed over before.
+  subroutine check_in_place(file, errors)
+    type(output_file_t), intent(inout) :: file
+    type(error_list_t),  intent(inout) :: errors
+
+    if (.not. file%is_open()) return
+    if (size_of_file(file%path) == file%bytes) return
+    file%failed = .true.
+    call errors%add('was removed, replaced or changed by someone else during the run', &
+      where=file%path)
+  end subroutine check_in_place
 
   !> Close the file; harmless where it is not open.
   subroutine close_output(file, errors)
@@ -154,9 +148,11 @@ contains
     if (status /= 0) call errors%add('did not reach the disk: is it full?', where=path)
   end subroutine sync_file
 
-  !> Overwrite the first bytes of a file that exists.
-  subroutine patch_file(path, text, errors)
-    character(*),       intent(in)    :: path, text
+  !> Overwrite bytes of a file that exists, in one call of the operating system.
+  subroutine patch_file(path, offset, text, errors)
+    character(*),       intent(in)    :: path
+    integer(i8),        intent(in)    :: offset   !! bytes before them
+    character(*),       intent(in)    :: text
     type(error_list_t), intent(inout) :: errors
     type(c_ptr) :: stream
     logical     :: done
@@ -166,30 +162,48 @@ contains
     length = len(text, c_size_t)
     stream = c_fopen(path//c_null_char, 'r+b'//c_null_char)
     if (c_associated(stream)) then
-      done = c_fwrite(text, 1_c_size_t, length, stream) == length
+      done = c_pwrite(c_fileno(stream), text, length, int(offset, c_long)) == length
       done = c_fclose(stream) == 0 .and. done
     end if
     if (.not. done) call errors%add('cannot be written to: is the disk full?', where=path)
   end subroutine patch_file
 
-  !> Write a whole text file beside its final name and put it in place in one step.
-  subroutine write_whole_file(path, text, errors)
-    character(*),       intent(in)    :: path, text
+  !> Cut a file off behind its first bytes.
+  subroutine cut_file(path, length, errors)
+    character(*),       intent(in)    :: path
+    integer(i8),        intent(in)    :: length   !! [bytes]
     type(error_list_t), intent(inout) :: errors
-    type(output_file_t) :: file
+
+    if (c_truncate(path//c_null_char, int(length, c_long)) == 0) return
+    call errors%add('cannot be cut off: is writing permitted?', where=path)
+  end subroutine cut_file
+
+  !> Bytes of a file, -1 where there is none.
+  integer(i8) function size_of_file(path) result(bytes)
+    character(*), intent(in) :: path
+    logical :: there
+
+    inquire (file=path, exist=there, size=bytes)
+    if (.not. there) bytes = -1
+  end function size_of_file
+
+  !> Close a file that was written beside its final name, and put it in place in one step; where
+  !> something failed it is removed.
+  subroutine publish_output(file, path, errors)
+    type(output_file_t), intent(inout) :: file
+    character(*),        intent(in)    :: path
+    type(error_list_t),  intent(inout) :: errors
     logical :: whole, ignored
 
-    call open_output(file, path//'.tmp', .false., errors)
-    call write_line(file, text, errors)
     call flush_output(file, errors)
     whole = file%is_open()
     call close_output(file, errors)
     if (whole .and. .not. file%failed) then
-      call replace_file(path//'.tmp', path, errors)
+      call replace_file(file%path, path, errors)
     else
-      ignored = remove_file(path//'.tmp')
+      ignored = remove_file(file%path)
     end if
-  end subroutine write_whole_file
+  end subroutine publish_output
 
   !> Create a folder unless it is there, and check that it can be written to.
   subroutine prepare_folder(path, errors)

@@ -2,16 +2,20 @@
 !>
 !> The one module variable of the program lives here: a signal handler can reach nothing else.
 module pd_system
-  use, intrinsic :: iso_c_binding, only: c_char, c_funloc, c_funptr, c_int, c_intptr_t, &
-    c_null_char, c_size_t
+  use, intrinsic :: iso_c_binding, only: c_associated, c_char, c_f_pointer, c_funloc, c_funptr, &
+    c_int, c_intptr_t, c_long, c_null_char, c_null_ptr, c_ptr, c_size_t
   use, intrinsic :: iso_fortran_env, only: error_unit, output_unit
   implicit none
   private
 
   public :: exit_program, rename_file, remove_file, make_directories, is_terminal, host_name
-  public :: set_environment, catch_signals, pending_signal, sigint, sigterm
+  public :: same_file, process_number, wait_a_while
+  public :: set_environment, catch_signals, pending_signal, signal_name, sigint
 
-  integer, parameter :: sigint = 2, sigpipe = 13, sigterm = 15, sigxfsz = 25
+  integer, parameter :: sighup = 1, sigint = 2, sigpipe = 13, sigterm = 15, sigxcpu = 24, &
+    sigxfsz = 25
+  !> Numbers that SIGUSR1 and SIGUSR2 have on some system; on others they mean something else.
+  integer, parameter :: of_the_user(4) = [10, 12, 30, 31]
 
   !> The last signal that arrived, 0: none.
   integer(c_int), volatile, save :: last_signal = 0
@@ -53,6 +57,32 @@ module pd_system
       character(kind=c_char), intent(in) :: name(*), value(*)
       integer(c_int), value :: overwrite
     end function c_setenv
+    type(c_ptr) function c_strsignal(number) bind(c, name='strsignal')
+      import :: c_int, c_ptr
+      integer(c_int), value :: number
+    end function c_strsignal
+    type(c_ptr) function c_realpath(path, room) bind(c, name='realpath')
+      import :: c_char, c_ptr
+      character(kind=c_char), intent(in) :: path(*)
+      type(c_ptr), value :: room
+    end function c_realpath
+    integer(c_size_t) function c_strlen(text) bind(c, name='strlen')
+      import :: c_ptr, c_size_t
+      type(c_ptr), value :: text
+    end function c_strlen
+    subroutine c_free(address) bind(c, name='free')
+      import :: c_ptr
+      type(c_ptr), value :: address
+    end subroutine c_free
+    integer(c_int) function c_getpid() bind(c, name='getpid')
+      import :: c_int
+    end function c_getpid
+    integer(c_int) function c_poll(descriptors, count, milliseconds) bind(c, name='poll')
+      import :: c_int, c_long, c_ptr
+      type(c_ptr), value :: descriptors
+      integer(c_long), value :: count
+      integer(c_int), value :: milliseconds
+    end function c_poll
     type(c_funptr) function c_signal(number, handler) bind(c, name='signal')
       import :: c_funptr, c_int
       integer(c_int), value :: number
@@ -130,18 +160,85 @@ contains
     ignored = c_setenv(c_string(name), c_string(value), 0_c_int)
   end subroutine set_environment
 
-  !> From now on SIGINT and SIGTERM are only noted, for `pending_signal`. A file that exceeds a
-  !> limit (SIGXFSZ) or a closed pipe behind the screen (SIGPIPE) must not kill a run: the write
-  !> that fails reports it.
+  !> Whether two names are those of one file, through links and folders too.
+  logical function same_file(one, other) result(same)
+    character(*), intent(in) :: one, other
+    character(:), allocatable :: place
+
+    place = real_path(one)
+    same = .false.
+    if (place /= '') same = place == real_path(other)
+  end function same_file
+
+  !> The one full name of a file, '' where there is none.
+  function real_path(path) result(text)
+    character(*), intent(in) :: path
+    character(:), allocatable :: text
+    type(c_ptr) :: found
+
+    text = ''
+    found = c_realpath(c_string(path), c_null_ptr)
+    if (.not. c_associated(found)) return
+    text = fortran_text(found)
+    call c_free(found)
+  end function real_path
+
+  !> Number of this process.
+  integer function process_number()
+    process_number = int(c_getpid())
+  end function process_number
+
+  !> Do nothing for a while.
+  subroutine wait_a_while(milliseconds)
+    integer, intent(in) :: milliseconds
+    integer(c_int) :: ignored
+
+    ignored = c_poll(c_null_ptr, 0_c_long, int(milliseconds, c_int))
+  end subroutine wait_a_while
+
+  !> From now on the signals that ask a run to stop are only noted, for `pending_signal`: SIGINT,
+  !> SIGTERM, SIGHUP (the terminal is gone), SIGXCPU, SIGUSR1 and SIGUSR2 (a batch system says that
+  !> time is nearly up). A file that exceeds a limit (SIGXFSZ) or a closed pipe behind the screen
+  !> (SIGPIPE) must not kill a run: the write that fails reports it.
   subroutine catch_signals()
     type(c_funptr) :: previous, ignore
+    character(:), allocatable :: name
+    integer :: k
 
     ignore = transfer(1_c_intptr_t, ignore)   ! SIG_IGN of the C library
     previous = c_signal(int(sigxfsz, c_int), ignore)
     previous = c_signal(int(sigpipe, c_int), ignore)
-    previous = c_signal(int(sigint, c_int), c_funloc(note_signal))
-    previous = c_signal(int(sigterm, c_int), c_funloc(note_signal))
+    call note_from_now_on(sigint)
+    call note_from_now_on(sigterm)
+    call note_from_now_on(sighup)
+    call note_from_now_on(sigxcpu)
+    do k = 1, size(of_the_user)
+      name = signal_name(of_the_user(k))
+      if (index(name, 'User defined signal') == 1) call note_from_now_on(of_the_user(k))
+    end do
   end subroutine catch_signals
+
+  !> Note a signal when it comes, unless whoever started the program wants it ignored (nohup).
+  subroutine note_from_now_on(number)
+    integer, intent(in) :: number
+    type(c_funptr) :: previous, ignore
+
+    ignore = transfer(1_c_intptr_t, ignore)
+    previous = c_signal(int(number, c_int), ignore)
+    if (c_associated(previous, ignore)) return
+    previous = c_signal(int(number, c_int), c_funloc(note_signal))
+  end subroutine note_from_now_on
+
+  !> What the system calls a signal: 'Hangup', 'User defined signal 1'.
+  function signal_name(number) result(name)
+    integer, intent(in) :: number
+    character(:), allocatable :: name
+    type(c_ptr) :: text
+
+    name = 'unknown'
+    text = c_strsignal(int(number, c_int))
+    if (c_associated(text)) name = fortran_text(text)
+  end function signal_name
 
   !> The signal that arrived since `catch_signals`, 0: none.
   integer function pending_signal()
@@ -153,6 +250,19 @@ contains
 
     last_signal = number
   end subroutine note_signal
+
+  function fortran_text(address) result(text)
+    type(c_ptr), intent(in) :: address   !! of a text of C
+    character(:), allocatable :: text
+    character(kind=c_char), pointer :: letters(:)
+    integer :: i
+
+    call c_f_pointer(address, letters, [c_strlen(address)])
+    allocate (character(size(letters)) :: text)
+    do i = 1, size(letters)
+      text(i:i) = letters(i)
+    end do
+  end function fortran_text
 
   pure function c_string(text)
     character(*), intent(in) :: text

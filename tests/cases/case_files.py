@@ -69,7 +69,7 @@ def without_group(text, group):
     return re.sub(rf"&{group}\b[^/]*/\n", "", text)
 
 
-def begin(program, folder, text, *options):
+def begin(program, folder, text, *options, **environment):
     """Start a run in the background."""
     (folder / "run.nml").write_text(uncontrolled(text))
     return subprocess.Popen(
@@ -77,6 +77,7 @@ def begin(program, folder, text, *options):
         cwd=folder,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
+        env={**os.environ, **environment},
     )
 
 

@@ -20,7 +20,7 @@ from typing import Any, NoReturn
 from ..read.errors import PostError
 from ..version import __version__
 from . import band, compare, contours, curves, geometry, info, report, study
-from .options import Arguments
+from .options import Arguments, check_outputs
 
 
 class _Parser(argparse.ArgumentParser):
@@ -136,6 +136,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit status."""
     try:
         args = parser().parse_args(argv)
+        check_outputs(args)
         status = args.action(args)
         sys.stdout.flush()
     except SystemExit as stop:

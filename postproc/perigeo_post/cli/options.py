@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ..read.errors import RequestError
+from ..read.outputs import FIGURE, PAGE, TABLE, check_output
 
 Arguments = argparse.Namespace
 
@@ -100,6 +101,19 @@ def add_labels(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--labels", metavar="TEXT", nargs="+", help="labels of the runs (default: their names)"
     )
+
+
+def check_outputs(args: Arguments) -> None:
+    """Refuse outputs that would destroy something, before anything is computed."""
+    if args.command == "study":
+        return  # its output is a folder of its own
+    inputs = [*getattr(args, "files", []), *([args.file] if hasattr(args, "file") else [])]
+    kinds = {"output": PAGE if args.command == "report" else FIGURE, "csv": TABLE, "table": TABLE}
+    asked = {name: path for name in kinds if (path := getattr(args, name, None)) is not None}
+    for name, path in asked.items():
+        check_output(path, kinds[name], inputs)
+    if len({path.resolve() for path in asked.values()}) < len(asked):
+        raise RequestError("two outputs have one name: the second would replace the first")
 
 
 def beside(file: Path, kind: str, ending: str = ".png") -> Path:

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from ..read.errors import OutputError, PostError, RequestError
+from ..read.outputs import FIGURE, check_output
 from ..read.run import Frame
 from .contours import (
     Panel,
@@ -39,7 +40,7 @@ def animate(
     dpi: int = 150,
 ) -> Path:
     """Write a GIF or MP4 (by the ending) of a field; all frames share one colour scale."""
-    path = check_figure_path(path, ENDINGS)
+    path = check_output(check_figure_path(path, ENDINGS), FIGURE)
     if not frames:
         raise RequestError("no frame to animate")
     if not 0.1 <= fps <= 60.0:

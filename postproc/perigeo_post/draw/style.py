@@ -13,6 +13,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from ..read.errors import OutputError, RequestError
+from ..read.outputs import FIGURE, check_output
 
 SINGLE = 88.0  # column width [mm]
 DOUBLE = 180.0
@@ -98,7 +99,7 @@ def check_figure_path(path: str | Path, endings: tuple[str, ...] = (".png", ".pd
 
 def save_figure(figure: Figure, path: str | Path) -> Path:
     """Write a figure as PNG or PDF, by the ending of the name."""
-    path = check_figure_path(path)
+    path = check_output(check_figure_path(path), FIGURE)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with style():

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..read.errors import OutputError
+from ..read.outputs import TABLE, check_output
 from ..read.run import Frame
 from .band import BandMeasure, Profile
 from .curves import Curve
@@ -50,7 +51,7 @@ def write_rows(
     path: str | Path, rows: Sequence[Mapping[str, Any]], units: Mapping[str, str] | None = None
 ) -> Path:
     """A table with one dictionary a row; names in the header carry their unit in brackets."""
-    path = Path(path)
+    path = check_output(path, TABLE)
     units = TABLE_UNITS if units is None else units
     names = list(dict.fromkeys(name for row in rows for name in row))
     header = [f"{name} [{units[name]}]" if units.get(name) else name for name in names]

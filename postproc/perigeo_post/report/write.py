@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from ..read.errors import OutputError, RequestError
+from ..read.outputs import PAGE, check_output
 from .check import LARGE, check_report
 from .data import FAILED, MISSING, Material, gather
 from .page import page_html
@@ -62,6 +63,7 @@ def write_report(
         raise RequestError(
             f"{results} holds no study; 'make figures' or 'perigeo-post study FILE' makes them"
         )
+    check_output(output, PAGE)
     text, unreadable = page_html(material)
     try:
         output.parent.mkdir(parents=True, exist_ok=True)

@@ -114,6 +114,10 @@ class Job:
 
     def write_input(self) -> str:
         """Put the input and its files into the folder; return the checksum of the input."""
+        if not self.record_path.exists() and any(self.folder.glob(f"{self.id}*.h5")):
+            raise OutputError(
+                f"{self.folder} holds results that no study has made; choose another --output"
+            )
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
             for name, source in self.files.items():
