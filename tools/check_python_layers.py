@@ -17,6 +17,7 @@ PACKAGE = "perigeo_post"
 # Folder, and the packages beside the standard library that it may know.
 LAYERS = {
     "version": set(),
+    "surroundings": {"matplotlib"},
     "read": {"numpy", "h5py"},
     "measure": {"numpy", "matplotlib.tri"},
     "draw": {"numpy", "matplotlib", "PIL"},

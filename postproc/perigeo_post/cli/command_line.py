@@ -11,7 +11,9 @@ run: the others work without matplotlib.
 from __future__ import annotations
 
 import argparse
+import io
 import os
+import re
 import sys
 import textwrap
 from collections.abc import Callable, Sequence
@@ -24,7 +26,14 @@ from .options import Arguments
 
 
 class _Parser(argparse.ArgumentParser):
-    """Exit status 1 for a wrong command line, as the program perigeo has it."""
+    """Exit status 1 for a wrong command line, as the program perigeo has it.
+
+    What begins like a negative number is a value, never an option: -2e5, -0.5%.
+    """
+
+    def __init__(self, *args: Any, **options: Any) -> None:
+        super().__init__(*args, **options)
+        self._negative_number_matcher = re.compile(r"-\.?\d")
 
     def error(self, message: str) -> NoReturn:
         self.print_usage(sys.stderr)
@@ -134,6 +143,9 @@ def parser() -> argparse.ArgumentParser:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit status."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):  # letters that a terminal cannot show are no error
+            stream.reconfigure(errors="backslashreplace")
     try:
         args = parser().parse_args(argv)
         status = args.action(args)

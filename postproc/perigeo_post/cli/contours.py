@@ -22,6 +22,7 @@ from .options import (
     add_state,
     beside,
     draw_figure,
+    print_json,
     say,
 )
 
@@ -90,7 +91,7 @@ def carry_out(args: Arguments) -> None:
     if args.csv:
         say(args, export.write_points(args.csv, frames, args.field))
     if args.json:
-        print(export.to_json([frame_numbers(f, args.field, args.fictitious) for f in frames]))
+        print_json([frame_numbers(f, args.field, args.fictitious) for f in frames])
 
     def draw() -> Any:
         from ..draw.contours import contour_figure
@@ -142,7 +143,7 @@ def carry_out_animate(args: Arguments) -> None:
     run = Run(args.file)
     frames = shown_frames(args, run.frames(args.include_invalid))
     if args.json:
-        print(export.to_json([frame_numbers(f, args.field, args.fictitious) for f in frames]))
+        print_json([frame_numbers(f, args.field, args.fictitious) for f in frames])
         if args.output is None:
             return
     path = args.output or beside(args.file, args.field, ".gif")

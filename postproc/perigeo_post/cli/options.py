@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from ..measure.export import to_json
 from ..read.errors import RequestError
 
 Arguments = argparse.Namespace
@@ -115,6 +116,13 @@ def draw_figure(args: Arguments, file: Path, kind: str, draw: Callable[[], Any])
     path = args.output or beside(file, kind)
     check_figure_path(path)
     say(args, save_figure(draw(), path))
+
+
+def print_json(value: Any) -> None:
+    """Numbers on standard output, also where that cannot show every letter."""
+    encoding = getattr(sys.stdout, "encoding", None) or "ascii"
+    plain = "utf" not in encoding.lower()
+    print(to_json(value, only_ascii=plain))
 
 
 def say(args: Arguments, path: Path) -> None:

@@ -26,6 +26,7 @@ from .style import (
     SINGLE,
     new_figure,
     prefix_for,
+    readable,
     style,
     with_unit,
 )
@@ -96,7 +97,7 @@ def panel_of(
     volumes = np.abs(run.volumes[keep])
     size = np.full(len(points), run.spacing) if lattice is not None else np.sqrt(volumes)
     return Panel(
-        frame.label if title is None else title,
+        frame.label if title is None else readable(title),
         points, shift, size, values[keep], lattice, outline,
     )  # fmt: skip
 

@@ -25,7 +25,17 @@ from .contours import (
     fill_axes,
     panel_of,
 )
-from .style import COLOURS, DASHES, DOUBLE, SINGLE, new_figure, prefix_for, style, with_unit
+from .style import (
+    COLOURS,
+    DASHES,
+    DOUBLE,
+    SINGLE,
+    new_figure,
+    prefix_for,
+    readable,
+    style,
+    with_unit,
+)
 
 _WORDS = {"strain": "Nominal strain", "axial_stress": "Axial stress", "time": "Time"}
 
@@ -47,7 +57,7 @@ def draw_curves(
     percent = first.x_name == "strain"
     for k, curve in enumerate(curves):
         ax.plot(
-            curve.x * (100.0 if percent else 1.0), curve.y * factor, label=curve.label,
+            curve.x * (100.0 if percent else 1.0), curve.y * factor, label=readable(curve.label),
             color=COLOURS[k % len(COLOURS)], linestyle=DASHES[k % len(DASHES)],
         )  # fmt: skip
     signed = first.y_name == "axial_stress"
@@ -226,7 +236,7 @@ def profile_figure(measures: Sequence[BandMeasure], labels: Sequence[str] | None
             ax.plot(
                 m.profile.distance - m.interpolated.peak_distance, m.profile.values,
                 color=COLOURS[k % len(COLOURS)], linestyle=DASHES[k % len(DASHES)],
-                label=f"{name}: {m.interpolated.width:.3f} m",
+                label=readable(f"{name}: {m.interpolated.width:.3f} m"),
             )  # fmt: skip
         ax.set_xlabel("Distance from the peak along the line [m]")
         ax.set_ylabel(with_unit(label_of(first.name), first.unit))

@@ -13,7 +13,7 @@ from matplotlib.patches import Circle
 
 from ..read.points import FloatArray
 from ..read.points_file import BODY, ModelPoints
-from .style import COLOURS, DOUBLE, MAX_HEIGHT, MM, new_figure, style
+from .style import COLOURS, DOUBLE, MAX_HEIGHT, MM, new_figure, readable, style
 
 SOIL = ["#C9B79C", "#8C7B65", "#E3D5B8", "#A89078", "#6E6257", "#D9C2A0"]
 BESIDE = 45.0  # width of the legend [mm]
@@ -39,7 +39,7 @@ def geometry_figure(model: ModelPoints, title: str = "") -> Figure:
         axes.set_xlabel("x [m]")
         axes.set_ylabel("y [m]")
         if title:
-            axes.set_title(title)
+            axes.set_title(readable(title))
         figure.legend(handles=entries, loc="outside right upper")
     return figure
 
@@ -72,7 +72,7 @@ def _discs(
         offset_transform=axes.transData, facecolors=colour, edgecolors="0.3", linewidths=thin,
     ))  # fmt: skip
     return Line2D([], [], marker="o", linestyle="none", color=colour,
-                  label=f"{name}, {len(size)} points")  # fmt: skip
+                  label=readable(f"{name}, {len(size)} points"))  # fmt: skip
 
 
 def _draw_load(axes: Axes, name: str, rows: FloatArray, k: int, extent: float) -> Line2D:
@@ -99,7 +99,7 @@ def _draw_patch(axes: Axes, name: str, rows: FloatArray, k: int, extent: float) 
     for x, y, radius in rows:
         axes.add_patch(Circle((x, y), max(radius, 0.004 * extent), fill=False, linestyle="--",
                               linewidth=1.0, color=COLOURS[1 + k], zorder=5))  # fmt: skip
-    return Line2D([], [], linestyle="--", color=COLOURS[1 + k], label=name)
+    return Line2D([], [], linestyle="--", color=COLOURS[1 + k], label=readable(name))
 
 
 # How each kind of line of the file is drawn: name, its rows, number of the name, extent [m].

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -11,6 +12,7 @@ from typing import Any
 import matplotlib
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.mathtext import MathTextParser
 
 from ..read.errors import OutputError, RequestError
 
@@ -48,16 +50,48 @@ STYLE: dict[str, Any] = {
     "axes.unicode_minus": True,
 }
 
+# Settings of matplotlib that say nothing of how a figure looks
+_LEFT_ALONE = {
+    "backend", "backend_fallback", "interactive", "toolbar", "timezone", "datapath",
+    "date.epoch", "tk.window_focus", "webagg.port", "webagg.address", "webagg.open_in_browser",
+    "webagg.port_retries", "docstring.hardcopy",
+}  # fmt: skip
+
 _PREFIXES = [(1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ")]
 _PREFIXED = {"Pa", "J/m", "N/m", "m", "m/s"}
 
 
 @contextmanager
 def style() -> Iterator[None]:
-    """The settings of all figures, left again afterwards."""
-    settings: Any = STYLE
-    with matplotlib.rc_context(settings):
-        yield
+    """The settings of all figures, left again afterwards.
+
+    They begin with those of matplotlib itself, so that a file of settings changes nothing: LaTeX
+    for all text, or numbers as the language of the user writes them, which need what may not be
+    there.
+    """
+    given: Any = matplotlib.rcParamsDefault
+    settings: Any = {key: value for key, value in given.items() if key not in _LEFT_ALONE}
+    settings.update(STYLE)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", matplotlib.MatplotlibDeprecationWarning)
+        with matplotlib.rc_context(settings):
+            yield
+
+
+def readable(label: str) -> str:
+    """A label of the user as legends and titles show it.
+
+    Legends leave out labels that begin with "_", unless something without width stands before
+    it. A dollar sign begins mathematics for it: where that cannot be read, it is a dollar sign.
+    """
+    text = f"\u200b{label}" if label.startswith("_") else label
+    if "$" in text:
+        try:
+            for line in text.splitlines():
+                MathTextParser("path").parse(line)
+        except ValueError:
+            text = text.replace("$", r"\$")
+    return text
 
 
 def new_figure(width: float, height: float, layout: Any = "constrained") -> Figure:

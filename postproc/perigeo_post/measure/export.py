@@ -41,9 +41,9 @@ def plain(value: Any) -> Any:
     return value
 
 
-def to_json(value: Any) -> str:
+def to_json(value: Any, only_ascii: bool = False) -> str:
     """JSON text of numbers and tables."""
-    return json.dumps(plain(value), indent=2, ensure_ascii=False, allow_nan=False)
+    return json.dumps(plain(value), indent=2, ensure_ascii=only_ascii, allow_nan=False)
 
 
 def write_rows(

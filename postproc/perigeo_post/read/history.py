@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .errors import FieldNotFoundError, ResultError
-from .file import plain, read, text_attribute
+from .file import numbers_in, plain, read, text_attribute
 from .first_schema import column_meaning
 
 FloatArray = npt.NDArray[np.float64]
@@ -153,7 +153,10 @@ def stored_history(path: Path) -> StoredHistory | None:
         meanings: dict[str, Column] = {}
         for name in str(about["columns"]).split():
             data = group[name]
-            columns[name] = np.asarray(data[:written], dtype=float)
+            values = numbers_in(file, f"history/{name}", (None,))
+            if not 0 <= written <= len(values):
+                raise ValueError(f"/history/{name} has {len(values)} of {written} rows")
+            columns[name] = values[:written].astype(float)
             meanings[name] = Column(
                 text_attribute(data, "unit"), text_attribute(data, "description")
             )

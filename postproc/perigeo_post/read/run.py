@@ -21,7 +21,7 @@ import numpy.typing as npt
 from . import fields as _fields
 from .errors import FieldNotFoundError, FrameNotFoundError, ResultError
 from .fields import About, Field
-from .file import about_dataset, checked_attributes, dataset, plain, read, text_of
+from .file import about_dataset, checked_attributes, dataset, numbers_in, plain, read, text_of
 from .history import History, read_history, stored_history, with_later_rows
 from .points import BoolArray, FloatArray, PointSet
 
@@ -78,9 +78,10 @@ class Frame:
         return np.asarray(active.values > 0.5)
 
     def _stored(self, name: str) -> Field | None:
-        found = dataset(self.run.path, f"{self.key}/{name}", name)
+        points = len(self.run.volumes)
+        found = dataset(self.run.path, f"{self.key}/{name}", name, points)
         if found is None and name in _fields.OF_THE_POINTS:
-            found = dataset(self.run.path, f"points/{name}", name)
+            found = dataset(self.run.path, f"points/{name}", name, points)
         return found
 
 
@@ -96,7 +97,7 @@ class Run:
         self.attributes: dict[str, Any] = self._read(
             lambda file: checked_attributes(self.path, file)
         )
-        self._points: dict[str, Any] = {}
+        self._points: dict[str, npt.NDArray[Any]] = {}
 
     def __enter__(self) -> Run:
         return self
@@ -116,9 +117,10 @@ class Run:
         return read(self.path, what)
 
     def _array(self, name: str) -> npt.NDArray[Any]:
-        if name not in self._points:
-            self._points[name] = self._read(lambda file: file[name][()])
-        return np.asarray(self._points[name])
+        """An array of the points, with as many rows as there are positions."""
+        if not self._points:
+            self._points = self._read(_points_of)
+        return self._points[name]
 
     # ---- what the run is -----------------------------------------------------------------
 
@@ -162,9 +164,9 @@ class Run:
         return self._corner("upper", np.max)
 
     def _corner(self, key: str, extreme: Any) -> FloatArray:
-        given = np.asarray(self.attributes.get(key, []), dtype=float)
-        if given.shape == (2,) and np.isfinite(given).all():
-            return given
+        given = np.asarray(self.attributes.get(key, []))
+        if given.shape == (2,) and given.dtype.kind in "iuf" and np.isfinite(given).all():
+            return given.astype(float)
         return np.asarray(extreme(self.positions[self.body], axis=0), dtype=float)
 
     @property
@@ -194,9 +196,15 @@ class Run:
         return {key: self.attributes[key] for key in keys.split() if key in self.attributes}
 
     @cached_property
+    def input_bytes(self) -> bytes:
+        """The namelist byte for byte, as it was given."""
+        text = self._read(lambda file: file["input/namelist"][()])
+        return text if isinstance(text, bytes) else text_of(text).encode()
+
+    @cached_property
     def input_text(self) -> str:
-        """The namelist, as it was given."""
-        return text_of(self._read(lambda file: file["input/namelist"][()]))
+        """The namelist as text; what is no UTF-8 is taken for Latin-1."""
+        return text_of(self.input_bytes)
 
     @cached_property
     def values(self) -> dict[str, str]:
@@ -242,17 +250,17 @@ class Run:
     @property
     def positions(self) -> FloatArray:
         """Reference positions of all points (n, 2) [m]."""
-        return np.asarray(self._array("points/position"), dtype=float)
+        return np.asarray(self._array("position"), dtype=float)
 
     @property
     def volumes(self) -> FloatArray:
         """Volumes of all points per unit thickness (n) [m^2]."""
-        return np.asarray(self._array("points/volume"), dtype=float)
+        return np.asarray(self._array("volume"), dtype=float)
 
     @property
     def boundary(self) -> npt.NDArray[np.int64]:
         """Boundary of each point (n): 0 for the body, k for the k-th boundary."""
-        return np.asarray(self._array("points/boundary"), dtype=np.int64)
+        return np.asarray(self._array("boundary"), dtype=np.int64)
 
     @property
     def body(self) -> BoolArray:
@@ -396,13 +404,16 @@ class Run:
 
     @property
     def history_path(self) -> Path:
-        """The history in CSV form: beside the .h5, with its stem (or the name of the run)."""
-        beside = self.path.with_name(f"{self.path.stem}_history.csv")
-        if not beside.exists():
-            named = self.path.with_name(f"{self.name}_history.csv")
-            if named.exists():
-                return named
-        return beside
+        """The history in CSV form: beside the .h5, with its stem (or the name of the run).
+
+        Where the .h5 is a symbolic link, also beside what it leads to.
+        """
+        folders = (self.path, self.path.resolve())
+        choices = [
+            *(path.with_name(f"{path.stem}_history.csv") for path in folders),
+            *(path.with_name(f"{self.name}_history.csv") for path in folders),
+        ]
+        return next((path for path in choices if path.exists()), choices[0])
 
     @property
     def has_history(self) -> bool:
@@ -423,6 +434,17 @@ class Run:
         if not csv.exists():
             raise ResultError(f"the history {csv} is missing")
         return read_history(csv)
+
+
+def _points_of(file: Any) -> dict[str, npt.NDArray[Any]]:
+    """Positions, volumes and boundaries of the points; a ValueError where they do not agree."""
+    position = numbers_in(file, "points/position", (None, 2))
+    if not np.isfinite(position).all():
+        raise ValueError("/points/position holds what is no number")
+    found = {"position": position}
+    for name in ("volume", "boundary"):
+        found[name] = numbers_in(file, f"points/{name}", (len(position),))
+    return found
 
 
 def _listed(frames: list[Frame]) -> str:

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..draw.contours import Panel, Scale, common_extent, common_scale, draw_panel, panel_of
-from ..draw.style import COLOURS, new_figure, style, with_unit
+from ..draw.style import COLOURS, new_figure, readable, style, with_unit
 from ..measure.smooth import WORDS, smoothed_for
 from ..read.errors import PostError, RequestError
 from ..read.fields import label_of
@@ -194,7 +194,7 @@ def _draw_line(ax: Axes, cell: _Cell) -> None:
 
 
 def _label_axes(ax: Axes, place: Place, heading: str, first: bool, lowest: bool) -> None:
-    ax.set_title(place.title, fontsize=7, pad=2.5, linespacing=1.1)
+    ax.set_title(readable(place.title), fontsize=7, pad=2.5, linespacing=1.1)
     ax.tick_params(labelsize=6, pad=1.5, labelleft=place.numbered)
     ax.locator_params(axis="x", nbins=2 if place.width < 16.0 else 4)
     ax.locator_params(axis="y", nbins=3 if place.height < 20.0 else 5)

@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ..draw.style import new_figure, style, with_unit
+from ..draw.style import new_figure, readable, style, with_unit
 from ..measure.curves import Curve, history_curve, stress_strain
 from ..measure.quality import START, kinetic_bound, kinetic_curve, reaction_gap
 from ..read.errors import PostError, RequestError
@@ -150,7 +150,7 @@ def _lines_into(ax: Axes, styled: Sequence[_Styled], factor: float) -> None:
     for s in styled:
         ax.plot(
             s.curve.x * _x_factor(s.curve), s.curve.y * factor, color=s.look.colour,
-            linestyle=s.look.dash, label=s.label,
+            linestyle=s.look.dash, label=None if s.label is None else readable(s.label),
         )  # fmt: skip
 
 
@@ -249,7 +249,7 @@ def _draw_quality(upper: Axes, lower: Axes, run: StudyRun, look: Look) -> list[R
         parts.append((name, x, y))
     if parts:  # a sample for the legend: both the points and the lines
         upper.plot([], [], color=look.colour, marker=look.marker, ms=3.0, linestyle=look.dash,
-                   label=run.label)  # fmt: skip
+                   label=readable(run.label))  # fmt: skip
     words = {"exact": "kinetic_ratio", "bound": "kinetic_bound", "gap": "reaction_gap"}
     return [
         {"series": run.series, "run": run.id, "label": run.label, "quantity": words[name],

@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, NullLocator
 
-from ..draw.style import new_figure, style
+from ..draw.style import new_figure, readable, style
 from ..read.errors import RequestError
 from . import drawing as draw
 from .drawing import AXES, COMMON, Look, Row
@@ -194,7 +194,7 @@ def _draw_points(
         yerr=np.nan_to_num(error) if bars else None,
         color=line.look.colour, marker=line.look.marker,
         linestyle=line.look.dash if connected else "none",
-        capsize=2.0, elinewidth=0.7, capthick=0.7, label=line.label,
+        capsize=2.0, elinewidth=0.7, capthick=0.7, label=readable(line.label),
     )  # fmt: skip
 
 
@@ -219,7 +219,7 @@ def _extra_lines(
     if target is not None:
         ax.axhline(
             float(target) * factor, color="black", linewidth=0.8, linestyle=(0, (4, 2)),
-            label=draw.text(options, "target_label") or None, zorder=draw.COMPARED,
+            label=readable(draw.text(options, "target_label")) or None, zorder=draw.COMPARED,
         )  # fmt: skip
     slope = options.get("slope")
     if isinstance(slope, str):
@@ -231,7 +231,7 @@ def _extra_lines(
         x = np.linspace(0.0, 1.05 * top, 2 if not draw.flag(options, "x_log") else 50)
         ax.plot(
             x * x_factor, slope * x * factor, color="black", linewidth=0.8, linestyle=":",
-            label=draw.text(options, "slope_label") or None, zorder=draw.COMPARED,
+            label=readable(draw.text(options, "slope_label")) or None, zorder=draw.COMPARED,
         )  # fmt: skip
 
 

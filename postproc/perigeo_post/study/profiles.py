@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from ..draw.style import new_figure, style, with_unit
+from ..draw.style import new_figure, readable, style, with_unit
 from ..measure.band import LEVEL, BandMeasure, Line
 from ..measure.measures import frame_profile
 from ..read.errors import PostError, RequestError
@@ -130,7 +130,7 @@ def _draw_profile(
         factor = 1.0 / (width.peak if plastic else float(np.nanmax(np.abs(curve.values))))
     ax.plot(
         profile.distance - start, curve.values * factor, color=look.colour, linestyle=look.dash,
-        label=label,
+        label=readable(label),
     )  # fmt: skip
     if plastic:
         target = width.level * width.peak * factor
