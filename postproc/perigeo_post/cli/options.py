@@ -40,7 +40,7 @@ def strain_value(text: str) -> float:
 def add_output(parser: argparse.ArgumentParser, csv: str | None = None) -> None:
     parser.add_argument(
         "-o", "--output", metavar="FIGURE", type=Path,
-        help="file to write, .png or .pdf (default: beside the first result)",
+        help="file to write, .png, .pdf, .svg or .eps (default: beside the first result)",
     )  # fmt: skip
     add_json(parser)
     if csv:

@@ -20,6 +20,7 @@ SINGLE = 88.0  # column width [mm]
 DOUBLE = 180.0
 MAX_HEIGHT = 220.0
 DPI = 300
+FIGURES = (".png", ".pdf", ".svg", ".eps")  # what a file may end in
 MM = 1.0 / 25.4
 
 # Okabe and Ito: distinct for all kinds of colour vision
@@ -57,8 +58,11 @@ _LEFT_ALONE = {
     "webagg.port_retries", "docstring.hardcopy",
 }  # fmt: skip
 
-_PREFIXES = [(1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ")]
-_PREFIXED = {"Pa", "J/m", "N/m", "m", "m/s"}
+_LARGE = [(1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, "")]
+_SMALL = [(1.0, ""), (1e-3, "m"), (1e-6, "µ")]
+# Stresses have no small prefixes: mPa would be read as MPa.
+_PREFIXED = {"Pa": _LARGE, "J/m": _LARGE, "J": _LARGE, "N/m": _LARGE, "N": _LARGE, "m": _SMALL,
+             "m/s": _SMALL, "s": _SMALL}  # fmt: skip
 
 
 @contextmanager
@@ -106,12 +110,11 @@ def prefix_for(largest: float, unit: str) -> tuple[float, str]:
 
     Pure numbers and unknown units keep factor 1.
     """
-    if unit not in _PREFIXED or not math.isfinite(largest) or largest <= 0.0:
+    prefixes = _PREFIXED.get(unit)
+    if prefixes is None or not math.isfinite(largest) or largest <= 0.0:
         return 1.0, unit
-    for size, letter in _PREFIXES:
-        if largest >= size:
-            return 1.0 / size, f"{letter}{unit}"
-    return 1.0 / _PREFIXES[-1][0], f"{_PREFIXES[-1][1]}{unit}"
+    size, letter = next((p for p in prefixes if largest >= p[0]), prefixes[-1])
+    return 1.0 / size, f"{letter}{unit}"
 
 
 def with_unit(text: str, unit: str) -> str:
@@ -121,17 +124,17 @@ def with_unit(text: str, unit: str) -> str:
     return f"{text} [{'–' if unit == '1' else unit}]"
 
 
-def check_figure_path(path: str | Path, endings: tuple[str, ...] = (".png", ".pdf")) -> Path:
+def check_figure_path(path: str | Path, endings: tuple[str, ...] = FIGURES) -> Path:
     """The path, if its ending is one that can be written."""
     path = Path(path)
     if path.suffix.lower() not in endings:
-        allowed = " or ".join(endings)
+        allowed = f"{', '.join(endings[:-1])} or {endings[-1]}"
         raise RequestError(f"the figure {path} must end in {allowed}")
     return path
 
 
 def save_figure(figure: Figure, path: str | Path) -> Path:
-    """Write a figure as PNG or PDF, by the ending of the name."""
+    """Write a figure as PNG, PDF, SVG or EPS, by the ending of the name."""
     path = check_figure_path(path)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -43,11 +43,8 @@ class Frame:
 
     @property
     def label(self) -> str:
-        """Strain where the run has platens, else time."""
-        text = f"t = {self.time:.4g} s"
-        if np.isfinite(self.strain):
-            text = f"ε = {100.0 * self.strain:.3g} %"
-        return text if self.valid else f"{text} (failing state)"
+        """Strain where the run has platens and it tells anything, else time."""
+        return labels_of([self])[0]
 
     def field(self, name: str) -> Field:
         """A stored or derived field with unit, description and components."""
@@ -83,6 +80,43 @@ class Frame:
         if found is None and name in _fields.OF_THE_POINTS:
             found = dataset(self.run.path, f"points/{name}", name, points)
         return found
+
+
+def labels_of(frames: Sequence[Frame]) -> list[str]:
+    """A label for each of these frames of one or several runs: its strain, its time, or both.
+
+    The time is told where the strain alone does not tell frames of a run apart, as in a cyclic
+    test, or is 0 in a state that is not the first.
+    """
+    found: list[str] = []
+    for frame in frames:
+        others = [other for other in frames if other.run is frame.run]
+        strains = [_strain_text(other.strain) for other in others]
+        states = {other.key for other in others}
+        apart = len(set(strains)) == len(states)
+        nothing = any(s == _ZERO and other.time > 0.0 for s, other in zip(strains, others))
+        text = _strain_text(frame.strain) if np.isfinite(frame.strain) else ""
+        if not text or nothing or not apart:
+            moves = text and set(strains) != {_ZERO}
+            time = _time_text(frame.time, [other.time for other in others])
+            text = f"{text}, {time}" if moves else time
+        found.append(text if frame.valid else f"{text} (failing state)")
+    return found
+
+
+def _strain_text(strain: float) -> str:
+    text = f"{100.0 * strain:.3g}"
+    return f"ε = {0 if float(text) == 0.0 else text} %"
+
+
+_ZERO = _strain_text(0.0)
+
+
+def _time_text(time: float, times: Sequence[float]) -> str:
+    """A time with as many digits as tell it from the others."""
+    different = len(set(times))
+    digits = next((d for d in range(4, 15) if len({f"{t:.{d}g}" for t in times}) == different), 15)
+    return f"t = {time:.{digits}g} s"
 
 
 class Run:
