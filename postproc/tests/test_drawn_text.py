@@ -25,8 +25,8 @@ from perigeo_post import (
 from perigeo_post.draw.geometry import geometry_figure
 from perigeo_post.draw.style import new_figure, prefix_for, style
 from perigeo_post.draw.text import fit_numbers
+from perigeo_post.read.labels import labels_of
 from perigeo_post.read.points_file import ModelPoints
-from perigeo_post.read.run import labels_of
 from perigeo_post.study.figures import FIGURES
 from perigeo_post.study.types import Column, State, StudyRun
 

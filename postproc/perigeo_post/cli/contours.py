@@ -12,7 +12,8 @@ import numpy as np
 
 from ..measure import export, measures
 from ..measure.smooth import are_smoothed, smoothed_for
-from ..read.run import Frame, Run, labels_of
+from ..read.labels import labels_of
+from ..read.run import Frame, Run
 from .options import (
     Arguments,
     add_colours,

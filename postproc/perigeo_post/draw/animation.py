@@ -11,7 +11,8 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from ..read.errors import OutputError, PostError, RequestError
-from ..read.run import Frame, labels_of
+from ..read.labels import labels_of
+from ..read.run import Frame
 from .contours import (
     Panel,
     Scale,

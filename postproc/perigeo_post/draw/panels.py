@@ -11,8 +11,9 @@ from matplotlib.figure import Figure
 
 from ..read.errors import RequestError
 from ..read.fields import label_of
+from ..read.labels import labels_of
 from ..read.points import FloatArray
-from ..read.run import Frame, labels_of
+from ..read.run import Frame
 from .contours import (
     Panel,
     Scale,

@@ -166,6 +166,17 @@ def numbers_in(file: Any, key: str, shape: tuple[int | None, ...]) -> npt.NDArra
     return np.asarray(data[()])
 
 
+def point_arrays(file: Any) -> dict[str, npt.NDArray[Any]]:
+    """Positions, volumes and boundaries of the points; a ValueError where they do not agree."""
+    position = numbers_in(file, "points/position", (None, 2))
+    if not np.isfinite(position).all():
+        raise ValueError("/points/position holds what is no number")
+    found = {"position": position}
+    for name in ("volume", "boundary"):
+        found[name] = numbers_in(file, f"points/{name}", (len(position),))
+    return found
+
+
 def dataset(path: Path, key: str, name: str, points: int) -> Field | None:
     """A dataset of the points: unit, description, components; None where it is not there."""
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -21,8 +21,9 @@ import numpy.typing as npt
 from . import fields as _fields
 from .errors import FieldNotFoundError, FrameNotFoundError, ResultError
 from .fields import About, Field
-from .file import about_dataset, checked_attributes, dataset, numbers_in, plain, read, text_of
+from .file import about_dataset, checked_attributes, dataset, plain, point_arrays, read, text_of
 from .history import History, read_history, stored_history, with_later_rows
+from .labels import labels_of
 from .points import BoolArray, FloatArray, PointSet
 
 T = TypeVar("T")
@@ -82,43 +83,6 @@ class Frame:
         return found
 
 
-def labels_of(frames: Sequence[Frame]) -> list[str]:
-    """A label for each of these frames of one or several runs: its strain, its time, or both.
-
-    The time is told where the strain alone does not tell frames of a run apart, as in a cyclic
-    test, or is 0 in a state that is not the first.
-    """
-    found: list[str] = []
-    for frame in frames:
-        others = [other for other in frames if other.run is frame.run]
-        strains = [_strain_text(other.strain) for other in others]
-        states = {other.key for other in others}
-        apart = len(set(strains)) == len(states)
-        nothing = any(s == _ZERO and other.time > 0.0 for s, other in zip(strains, others))
-        text = _strain_text(frame.strain) if np.isfinite(frame.strain) else ""
-        if not text or nothing or not apart:
-            moves = text and set(strains) != {_ZERO}
-            time = _time_text(frame.time, [other.time for other in others])
-            text = f"{text}, {time}" if moves else time
-        found.append(text if frame.valid else f"{text} (failing state)")
-    return found
-
-
-def _strain_text(strain: float) -> str:
-    text = f"{100.0 * strain:.3g}"
-    return f"ε = {0 if float(text) == 0.0 else text} %"
-
-
-_ZERO = _strain_text(0.0)
-
-
-def _time_text(time: float, times: Sequence[float]) -> str:
-    """A time with as many digits as tell it from the others."""
-    different = len(set(times))
-    digits = next((d for d in range(4, 15) if len({f"{t:.{d}g}" for t in times}) == different), 15)
-    return f"t = {time:.{digits}g} s"
-
-
 class Run:
     """A result file and the history beside it, read-only.
 
@@ -153,7 +117,7 @@ class Run:
     def _array(self, name: str) -> npt.NDArray[Any]:
         """An array of the points, with as many rows as there are positions."""
         if not self._points:
-            self._points = self._read(_points_of)
+            self._points = self._read(point_arrays)
         return self._points[name]
 
     # ---- what the run is -----------------------------------------------------------------
@@ -468,17 +432,6 @@ class Run:
         if not csv.exists():
             raise ResultError(f"the history {csv} is missing")
         return read_history(csv)
-
-
-def _points_of(file: Any) -> dict[str, npt.NDArray[Any]]:
-    """Positions, volumes and boundaries of the points; a ValueError where they do not agree."""
-    position = numbers_in(file, "points/position", (None, 2))
-    if not np.isfinite(position).all():
-        raise ValueError("/points/position holds what is no number")
-    found = {"position": position}
-    for name in ("volume", "boundary"):
-        found[name] = numbers_in(file, f"points/{name}", (len(position),))
-    return found
 
 
 def _listed(frames: list[Frame]) -> str:
