@@ -18,7 +18,7 @@ PACKAGE = "perigeo_post"
 LAYERS = {
     "version": set(),
     "surroundings": {"matplotlib"},
-    "read": {"numpy", "h5py"},
+    "read": {"numpy", "h5py", "xarray"},
     "measure": {"numpy", "matplotlib.tri"},
     "draw": {"numpy", "matplotlib", "PIL"},
     "study": {"numpy", "matplotlib", "pydantic", "pydantic_core", "simpleeval", "tomli"},

@@ -21,7 +21,7 @@ from typing import Any, NoReturn
 
 from ..read.errors import PostError
 from ..version import __version__
-from . import band, compare, contours, curves, geometry, info, report, study
+from . import band, compare, contours, curves, export, geometry, info, report, study
 from .options import Arguments
 
 
@@ -90,6 +90,14 @@ COMMANDS: dict[str, tuple[_Setup, _Action, str, str]] = {
         """\
         perigeo-post animate run.h5
         perigeo-post animate run.h5 --field von_mises --deformed 5 -o run.mp4""",
+    ),
+    "export": (
+        export.add_options, export.carry_out,
+        "frames for other programs: VTU with PVD, CSV, XDMF for meshio",
+        """\
+        perigeo-post export run.h5
+        perigeo-post export run.h5 --format csv --strain 1% --field stress plastic_strain
+        perigeo-post export run.h5 --format xdmf -o .""",
     ),
     "geometry": (
         geometry.add_options, geometry.carry_out,

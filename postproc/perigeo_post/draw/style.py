@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import math
 import warnings
 from collections.abc import Iterator
@@ -20,6 +21,7 @@ SINGLE = 88.0  # column width [mm]
 DOUBLE = 180.0
 MAX_HEIGHT = 220.0
 DPI = 300
+SCREEN = 120  # dots per inch in a notebook
 FIGURES = (".png", ".pdf", ".svg", ".eps")  # what a file may end in
 MM = 1.0 / 25.4
 
@@ -98,9 +100,19 @@ def readable(label: str) -> str:
     return text
 
 
+class ShownFigure(Figure):
+    """A figure that a notebook shows by itself, whatever its backend."""
+
+    def _repr_png_(self) -> bytes:
+        picture = io.BytesIO()
+        with style():
+            self.savefig(picture, format="png", dpi=SCREEN)
+        return picture.getvalue()
+
+
 def new_figure(width: float, height: float, layout: Any = "constrained") -> Figure:
     """An empty figure of this size in mm; needs no display."""
-    figure = Figure(figsize=(width * MM, height * MM), dpi=DPI, layout=layout)
+    figure = ShownFigure(figsize=(width * MM, height * MM), dpi=DPI, layout=layout)
     FigureCanvasAgg(figure)
     return figure
 

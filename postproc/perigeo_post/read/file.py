@@ -6,6 +6,7 @@ program is never disturbed.
 
 from __future__ import annotations
 
+import math
 import os
 import time
 from collections.abc import Callable, Iterator
@@ -33,7 +34,9 @@ def _opened(path: Path) -> Iterator[Any]:
     try:
         try:
             file = h5py.File(path, "r", locking=False)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OSError):
+            # An older h5py has no such argument; a file that this process holds open with a lock,
+            # as h5py and meshio do it, can be opened once more only in the same way.
             file = h5py.File(path, "r")
     except OSError as error:
         raise ResultError(_why_not(path, error)) from error
@@ -175,6 +178,15 @@ def point_arrays(file: Any) -> dict[str, npt.NDArray[Any]]:
     for name in ("volume", "boundary"):
         found[name] = numbers_in(file, f"points/{name}", (len(position),))
     return found
+
+
+def strength_reduction(file: Any) -> tuple[float, float] | None:
+    """A factor that is borne and one that is not; None where they were not sought."""
+    if "strength_reduction" not in file:
+        return None
+    about = file["strength_reduction"].attrs
+    borne, not_borne = float(about["borne"]), float(about["not_borne"])
+    return borne, not_borne if not_borne < 1.0e300 else math.inf
 
 
 def dataset(path: Path, key: str, name: str, points: int) -> Field | None:

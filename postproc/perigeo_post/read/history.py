@@ -82,7 +82,9 @@ class History(Mapping[str, FloatArray]):
         return History(self._columns, self.path, other._meanings)
 
     def __repr__(self) -> str:
-        return f"History({self.rows} rows: {', '.join(self._columns)})"
+        names = list(self._columns)
+        shown = names if len(names) <= 6 else [*names[:5], f"... {len(names) - 5} more"]
+        return f"History({self.rows} rows: {', '.join(shown)})"
 
 
 def read_history(path: str | Path) -> History:

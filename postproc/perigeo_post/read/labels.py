@@ -26,6 +26,9 @@ class State(Protocol):
     @property
     def valid(self) -> bool: ...
 
+    @property
+    def number(self) -> int | None: ...
+
 
 def labels_of(frames: Sequence[State]) -> list[str]:
     """A label for each of these frames of one or several runs: its strain, its time, or both.
@@ -62,3 +65,18 @@ def _time_text(time: float, times: Sequence[float]) -> str:
     different = len(set(times))
     digits = next((d for d in range(4, 15) if len({f"{t:.{d}g}" for t in times}) == different), 15)
     return f"t = {time:.{digits}g} s"
+
+
+def listed(frames: Sequence[State]) -> str:
+    """The states that there are, for an error about one that is not."""
+    if not frames:
+        return "no frame is written yet"
+    shown = [
+        (f"{f.strain:.6g}" if np.isfinite(f.strain) else f"{f.time:.6g} s")
+        + f" ({'failed' if f.number is None else f.number})"
+        for f in frames
+    ]
+    if len(shown) > 16:
+        shown = [*shown[:8], "...", *shown[-7:]]
+    kind = "strain" if np.isfinite(frames[0].strain) else "time"
+    return f"there are, by {kind} (number): {', '.join(shown)}"

@@ -6,9 +6,8 @@ program is never disturbed. What the program has not yet written is not shown.
 
 from __future__ import annotations
 
-import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -21,16 +20,27 @@ import numpy.typing as npt
 from . import fields as _fields
 from .errors import FieldNotFoundError, FrameNotFoundError, ResultError
 from .fields import About, Field
-from .file import about_dataset, checked_attributes, dataset, plain, point_arrays, read, text_of
+from .file import (
+    about_dataset,
+    checked_attributes,
+    dataset,
+    plain,
+    point_arrays,
+    read,
+    strength_reduction,
+    text_of,
+)
 from .history import History, read_history, stored_history, with_later_rows
-from .labels import labels_of
+from .labels import labels_of, listed
 from .points import BoolArray, FloatArray, PointSet
+from .shown import Short
+from .to_xarray import to_xarray
 
 T = TypeVar("T")
 
 
-@dataclass(frozen=True)
-class Frame:
+@dataclass(frozen=True, repr=False)
+class Frame(Short):
     """One stored state of a run. ``frame["stress_xx"]`` is the array of a field."""
 
     run: Run
@@ -218,14 +228,7 @@ class Run:
     def factor_of_safety(self) -> tuple[float, float] | None:
         """A factor that is borne and one that is not (infinite: all are); None if not sought."""
 
-        def read(file: Any) -> tuple[float, float] | None:
-            if "strength_reduction" not in file:
-                return None
-            about = file["strength_reduction"].attrs
-            borne, not_borne = float(about["borne"]), float(about["not_borne"])
-            return borne, not_borne if not_borne < 1.0e300 else math.inf
-
-        return self._read(read)
+        return self._read(strength_reduction)
 
     def value(self, key: str) -> str | None:
         """A value as used; the first where its group stands several times; None if absent."""
@@ -353,11 +356,11 @@ class Run:
             for state in frames:
                 if state.number == number:
                     return state
-            raise FrameNotFoundError(f"{self.path} has no frame {number}; {_listed(frames)}")
+            raise FrameNotFoundError(f"{self.path} has no frame {number}; {listed(frames)}")
         if strain is not None and self.strain_axis is None:
             raise FrameNotFoundError(
                 f"{self.path} has no platens, so no nominal strain: ask for a time; "
-                f"{_listed(frames)}"
+                f"{listed(frames)}"
             )
         wanted = strain if strain is not None else time
         assert wanted is not None
@@ -370,7 +373,7 @@ class Run:
         away = np.where(np.isfinite(there), np.abs(there - wanted), np.inf)
         if len(away) == 0 or away.min() > tolerance:
             what = f"strain {wanted:g}" if strain is not None else f"time {wanted:g} s"
-            raise FrameNotFoundError(f"{self.path} has no frame at {what}; {_listed(frames)}")
+            raise FrameNotFoundError(f"{self.path} has no frame at {what}; {listed(frames)}")
         return frames[int(away.argmin())]
 
     @cached_property
@@ -397,6 +400,14 @@ class Run:
     def field_names(self) -> list[str]:
         """Names of all fields: of the frames, stored and derived, and of the points."""
         return _fields.available(self.stored_fields)
+
+    def to_xarray(self, fields: Sequence[str] | None = None) -> Any:
+        """The valid frames as an xarray.Dataset, which is an extra of its own.
+
+        Dimensions frame, point and the components of each field; coordinates time, nominal_strain,
+        x, y, volume and boundary. `fields`: names, all stored fields by default.
+        """
+        return to_xarray(self, fields or list(self.stored_fields))
 
     # ---- history -------------------------------------------------------------------------
 
@@ -432,17 +443,3 @@ class Run:
         if not csv.exists():
             raise ResultError(f"the history {csv} is missing")
         return read_history(csv)
-
-
-def _listed(frames: list[Frame]) -> str:
-    if not frames:
-        return "no frame is written yet"
-    shown = [
-        (f"{f.strain:.6g}" if np.isfinite(f.strain) else f"{f.time:.6g} s")
-        + f" ({'failed' if f.number is None else f.number})"
-        for f in frames
-    ]
-    if len(shown) > 16:
-        shown = [*shown[:8], "...", *shown[-7:]]
-    kind = "strain" if np.isfinite(frames[0].strain) else "time"
-    return f"there are, by {kind} (number): {', '.join(shown)}"
