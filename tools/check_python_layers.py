@@ -17,7 +17,8 @@ PACKAGE = "perigeo_post"
 # Folder, and the packages beside the standard library that it may know.
 LAYERS = {
     "version": set(),
-    "read": {"numpy", "h5py"},
+    "surroundings": {"matplotlib"},
+    "read": {"numpy", "h5py", "xarray"},
     "measure": {"numpy", "matplotlib.tri"},
     "draw": {"numpy", "matplotlib", "PIL"},
     "study": {"numpy", "matplotlib", "pydantic", "pydantic_core", "simpleeval", "tomli"},

@@ -1,5 +1,4 @@
 from .draw.animation import animate as animate
-from .draw.contours import contour_figure as contour_figure
 from .draw.figures import band_figure as band_figure
 from .draw.figures import column_figure as column_figure
 from .draw.figures import compare_figure as compare_figure
@@ -7,6 +6,7 @@ from .draw.figures import curve_figure as curve_figure
 from .draw.figures import energy_figure as energy_figure
 from .draw.figures import profile_figure as profile_figure
 from .draw.figures import stress_strain_figure as stress_strain_figure
+from .draw.panels import contour_figure as contour_figure
 from .draw.style import save_figure as save_figure
 from .measure.band import Band as Band
 from .measure.band import BandMeasure as BandMeasure

@@ -194,6 +194,7 @@ def test_compare_draws_and_tabulates(
 
 def test_animate_writes_a_gif(result: Path, capsys: Capture) -> None:
     assert main(["animate", str(result)]) == 0
+    assert "a film of 4 frames" in capsys.readouterr().err
     with Image.open(result.with_name("made_plastic_strain.gif")) as image:
         assert image.n_frames == 4
     capsys.readouterr()

@@ -142,7 +142,7 @@ def test_an_animation_has_every_frame_and_one_scale(result: Path, tmp_path: Path
 
 def test_a_wrong_ending_or_place_is_refused(result: Path, tmp_path: Path) -> None:
     figure = stress_strain_figure([Run(result)])
-    with pytest.raises(RequestError, match=r"must end in \.png or \.pdf"):
+    with pytest.raises(RequestError, match=r"must end in \.png, \.pdf, \.svg or \.eps"):
         save_figure(figure, tmp_path / "curve.jpg")
     (tmp_path / "file").write_text("")
     with pytest.raises(OutputError, match="cannot write"):

@@ -119,7 +119,7 @@ def test_pictures_say_that_they_are_smoothed(result: Path, tmp_path: Path) -> No
     assert field == "Displacements smoothed over families"
     assert contour_figure([frame], deformed=10.0).get_suptitle() == shape.rpartition(",")[0]
     figure: Any = compare_figure([Run(result)], deformed=5.0, smooth=True)
-    assert "smoothed" in figure.subfigs[0].get_suptitle()
+    assert "smoothed" in figure.get_suptitle()
     assert animate([smoothed(frame)], tmp_path / "a.gif", deformed=5.0, dpi=50).exists()
     with pytest.raises(RequestError, match="no displacement to smooth in a picture of 'det_f'"):
         smoothed_for(frame, "det_f", None)

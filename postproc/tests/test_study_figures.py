@@ -14,12 +14,13 @@ from conftest import x_bands
 from test_figures import assert_drawn
 
 from perigeo_post import RequestError, Run, save_figure
+from perigeo_post.draw.layout import shared
+from perigeo_post.draw.legends import legend
 from perigeo_post.draw.style import new_figure, style
 from perigeo_post.study.contours import contours
 from perigeo_post.study.curves import curves, history, quality
-from perigeo_post.study.drawing import legend, legend_place
+from perigeo_post.study.drawing import legend_place
 from perigeo_post.study.figures import FIGURE_OPTIONS, FIGURES
-from perigeo_post.study.layout import shared
 from perigeo_post.study.measures import MEASURES
 from perigeo_post.study.plots import plot
 from perigeo_post.study.profiles import profiles

@@ -11,7 +11,16 @@ import numpy as np
 from ..measure import export, measures
 from ..measure.band import LEVEL, BandMeasure
 from ..read.run import Run
-from .options import Arguments, add_files, add_labels, add_output, add_state, draw_figure, say
+from .options import (
+    Arguments,
+    add_files,
+    add_labels,
+    add_output,
+    add_state,
+    draw_figure,
+    print_json,
+    say,
+)
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -49,7 +58,7 @@ def carry_out(args: Arguments) -> None:
         say(args, export.write_bands(args.table, found))
     if args.json:
         tables = [m.as_dict() for m in found]
-        print(export.to_json(tables[0] if len(tables) == 1 else tables))
+        print_json(tables[0] if len(tables) == 1 else tables)
     else:
         print("\n\n".join(_band_text(m) for m in found))
 

@@ -11,7 +11,9 @@ run: the others work without matplotlib.
 from __future__ import annotations
 
 import argparse
+import io
 import os
+import re
 import sys
 import textwrap
 from collections.abc import Callable, Sequence
@@ -19,12 +21,19 @@ from typing import Any, NoReturn
 
 from ..read.errors import PostError
 from ..version import __version__
-from . import band, compare, contours, curves, geometry, info, report, study
+from . import band, compare, contours, curves, export, geometry, info, report, study
 from .options import Arguments, check_outputs
 
 
 class _Parser(argparse.ArgumentParser):
-    """Exit status 1 for a wrong command line, as the program perigeo has it."""
+    """Exit status 1 for a wrong command line, as the program perigeo has it.
+
+    What begins like a negative number is a value, never an option: -2e5, -0.5%.
+    """
+
+    def __init__(self, *args: Any, **options: Any) -> None:
+        super().__init__(*args, **options)
+        self._negative_number_matcher = re.compile(r"-\.?\d")
 
     def error(self, message: str) -> NoReturn:
         self.print_usage(sys.stderr)
@@ -82,6 +91,14 @@ COMMANDS: dict[str, tuple[_Setup, _Action, str, str]] = {
         perigeo-post animate run.h5
         perigeo-post animate run.h5 --field von_mises --deformed 5 -o run.mp4""",
     ),
+    "export": (
+        export.add_options, export.carry_out,
+        "frames for other programs: VTU with PVD, CSV, XDMF for meshio",
+        """\
+        perigeo-post export run.h5
+        perigeo-post export run.h5 --format csv --strain 1% --field stress plastic_strain
+        perigeo-post export run.h5 --format xdmf -o .""",
+    ),
     "geometry": (
         geometry.add_options, geometry.carry_out,
         "the body of an input before it is run: points, boundaries, loads",
@@ -134,6 +151,9 @@ def parser() -> argparse.ArgumentParser:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit status."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):  # letters that a terminal cannot show are no error
+            stream.reconfigure(errors="backslashreplace")
     try:
         args = parser().parse_args(argv)
         check_outputs(args)

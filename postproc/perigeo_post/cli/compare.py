@@ -20,6 +20,7 @@ from .options import (
     add_output,
     add_signs,
     draw_figure,
+    print_json,
     say,
     strain_value,
 )
@@ -58,7 +59,10 @@ def carry_out(args: Arguments) -> None:
             if r.platens is not None
         ]
         say(args, export.write_curves(args.csv, curves))
-    print(export.to_json(rows) if args.json else _table_text(rows))
+    if args.json:
+        print_json(rows)
+    else:
+        print(_table_text(rows))
 
     def draw() -> Any:
         from ..draw import figures

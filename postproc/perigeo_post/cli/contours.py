@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -11,6 +12,7 @@ import numpy as np
 
 from ..measure import export, measures
 from ..measure.smooth import are_smoothed, smoothed_for
+from ..read.labels import labels_of
 from ..read.run import Frame, Run
 from .options import (
     Arguments,
@@ -22,10 +24,12 @@ from .options import (
     add_state,
     beside,
     draw_figure,
+    print_json,
     say,
 )
 
 MOST_PANELS = 6
+FILM = 12  # frames from which a film moves
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -86,14 +90,15 @@ def carry_out(args: Arguments) -> None:
             run, args.strain, args.time, args.frame, args.tolerance, args.include_invalid
         )
         frames += shown_frames(args, found)
-        titles += [f.label if len(runs) == 1 else f"{name}\n{f.label}" for f in found]
+        labels = labels_of(found)
+        titles += labels if len(runs) == 1 else [f"{name}\n{label}" for label in labels]
     if args.csv:
         say(args, export.write_points(args.csv, frames, args.field))
     if args.json:
-        print(export.to_json([frame_numbers(f, args.field, args.fictitious) for f in frames]))
+        print_json([frame_numbers(f, args.field, args.fictitious) for f in frames])
 
     def draw() -> Any:
-        from ..draw.contours import contour_figure
+        from ..draw.panels import contour_figure
 
         return contour_figure(
             frames, args.field, args.deformed, args.fictitious, args.min, args.max,
@@ -142,10 +147,16 @@ def carry_out_animate(args: Arguments) -> None:
     run = Run(args.file)
     frames = shown_frames(args, run.frames(args.include_invalid))
     if args.json:
-        print(export.to_json([frame_numbers(f, args.field, args.fictitious) for f in frames]))
+        print_json([frame_numbers(f, args.field, args.fictitious) for f in frames])
         if args.output is None:
             return
     path = args.output or beside(args.file, args.field, ".gif")
+    if len(frames) < FILM:
+        print(
+            f"perigeo-post: a film of {len(frames)} frames: all that the result has; a run writes "
+            "more with frame_count or frame_times in &output",
+            file=sys.stderr,
+        )
     say(args, animate(
         frames, path, args.field, args.deformed, args.fictitious, args.min, args.max, args.fps
     ))  # fmt: skip

@@ -16,6 +16,7 @@ from .options import (
     add_output,
     add_signs,
     draw_figure,
+    print_json,
     say,
     strain_value,
 )
@@ -71,7 +72,7 @@ def carry_out(args: Arguments) -> None:
             numbers["x"] = {"name": curve.x_name, "unit": curve.x_unit, "values": curve.x}
             numbers["y"] = {"name": curve.y_name, "unit": curve.y_unit, "values": curve.y}
             rows.append(numbers)
-        print(export.to_json(rows[0] if len(rows) == 1 else rows))
+        print_json(rows[0] if len(rows) == 1 else rows)
 
     def draw() -> Any:
         from ..draw import figures

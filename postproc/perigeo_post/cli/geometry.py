@@ -10,11 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from ..measure.export import to_json
 from ..read.errors import RequestError
 from ..read.points_file import BODY, ModelPoints, read_points_file
-from ..study.program import find_program
-from .options import Arguments, add_output, draw_figure
+from .options import Arguments, add_output, draw_figure, print_json
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -33,7 +31,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def carry_out(args: Arguments) -> None:
     model = model_of(args.file, args.program, args.settings)
     if args.json:
-        print(to_json(numbers_of(model)))
+        print_json(numbers_of(model))
 
     def draw() -> Any:
         from ..draw.geometry import geometry_figure
@@ -45,6 +43,8 @@ def carry_out(args: Arguments) -> None:
 
 def model_of(path: Path, program: Path | None, settings: list[str]) -> ModelPoints:
     """The points of an input, which the program sets up and checks."""
+    from ..study.program import find_program
+
     if not path.is_file():
         raise RequestError(f"the input file is not there: {path}")
     found = find_program(program, path)

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..measure import export, measures
+from ..measure import measures
 from ..read.run import Run
-from .options import Arguments, add_files, add_json
+from .options import Arguments, add_files, add_json, print_json
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -25,15 +26,24 @@ def carry_out(args: Arguments) -> None:
     if args.input or args.values:
         for run in runs:
             if args.input:
-                print(run.input_text, end="" if run.input_text.endswith("\n") else "\n")
+                _print_bytes(run.input_bytes)
             if args.values:
                 print("\n".join(f"{key} = {value}" for key, value in run.values.items()))
         return
     facts = [measures.run_facts(run) for run in runs]
     if args.json:
-        print(export.to_json(facts[0] if len(facts) == 1 else facts))
+        print_json(facts[0] if len(facts) == 1 else facts)
         return
     print("\n\n".join(_info_text(f) for f in facts))
+
+
+def _print_bytes(text: bytes) -> None:
+    """Print an input byte for byte, whatever the encodings of the input and of the terminal."""
+    sys.stdout.flush()
+    sys.stdout.buffer.write(text)
+    if not text.endswith(b"\n") and sys.stdout.isatty():
+        sys.stdout.buffer.write(b"\n")  # the prompt
+    sys.stdout.buffer.flush()
 
 
 def _info_text(facts: dict[str, Any]) -> str:

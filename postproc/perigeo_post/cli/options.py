@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+from ..measure.export import to_json
 from ..read.errors import RequestError
 from ..read.outputs import FIGURE, PAGE, TABLE, check_output
 
@@ -40,7 +41,7 @@ def strain_value(text: str) -> float:
 def add_output(parser: argparse.ArgumentParser, csv: str | None = None) -> None:
     parser.add_argument(
         "-o", "--output", metavar="FIGURE", type=Path,
-        help="file to write, .png or .pdf (default: beside the first result)",
+        help="file to write, .png, .pdf, .svg or .eps (default: beside the first result)",
     )  # fmt: skip
     add_json(parser)
     if csv:
@@ -129,6 +130,13 @@ def draw_figure(args: Arguments, file: Path, kind: str, draw: Callable[[], Any])
     path = args.output or beside(file, kind)
     check_figure_path(path)
     say(args, save_figure(draw(), path))
+
+
+def print_json(value: Any) -> None:
+    """Numbers on standard output, also where that cannot show every letter."""
+    encoding = getattr(sys.stdout, "encoding", None) or "ascii"
+    plain = "utf" not in encoding.lower()
+    print(to_json(value, only_ascii=plain))
 
 
 def say(args: Arguments, path: Path) -> None:

@@ -11,18 +11,19 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from ..read.errors import OutputError, PostError, RequestError
+from ..read.labels import labels_of
 from ..read.outputs import FIGURE, check_output
 from ..read.run import Frame
 from .contours import (
     Panel,
     Scale,
-    add_colour_bar,
     common_extent,
     common_scale,
     deformation_note,
     draw_panel,
     panel_of,
 )
+from .panels import Cell, fill, in_rows, wishes_for
 from .style import check_figure_path, new_figure, style
 
 ENDINGS = (".gif", ".mp4")
@@ -52,7 +53,9 @@ def animate(
     scale = common_scale([p.values for p in panels], unit, low, high)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        pictures = _pictures(panels, scale, field, deformation_note(deformed, frames), dpi)
+        pictures = _pictures(
+            panels, labels_of(frames), scale, field, deformation_note(deformed, frames), dpi
+        )
         if path.suffix.lower() == ".gif":
             _write_gif(path, pictures, fps)
         else:
@@ -63,31 +66,25 @@ def animate(
 
 
 def _pictures(
-    panels: Sequence[Panel], scale: Scale, field: str, note: str | None, dpi: int
-) -> Iterator[Image.Image]:
-    x0, y0, x1, y1 = common_extent(panels)
-    aspect = float((y1 - y0) / (x1 - x0))
-    wide = min(100.0, 120.0 / aspect)
+    panels: Sequence[Panel], titles: Sequence[str], scale: Scale, field: str, note: str | None,
+    dpi: int,
+) -> Iterator[Image.Image]:  # fmt: skip
+    """One after the other; nothing but the field and the title changes from one to the next."""
+    extent = common_extent(panels)
+    longest = max(titles, key=len)
     with style():
-        figure = new_figure(max(wide + 34.0, 60.0), wide * aspect + 24.0)
+        rows = in_rows([Cell(longest, extent, panels[0])], 1, note)
+        wishes = wishes_for(rows, 134.0, 120.0)
+        layout = rows.layout(wishes, scale)
+        figure = new_figure(layout.width, layout.height, layout=None)
         figure.set_dpi(dpi)
-        ax = figure.subplots()
-        drawn = draw_panel(ax, panels[0], scale)
-        add_colour_bar(figure, drawn, [ax], field, scale)
-        if note:
-            figure.suptitle(note)
-        for k, panel in enumerate(panels):
-            ax.clear()
+        (ax,) = fill(figure, layout, rows, wishes, scale, field)
+        for panel, title in zip(panels, titles):
+            for artist in [*ax.images, *ax.collections, *ax.patches]:
+                artist.remove()
             draw_panel(ax, panel, scale)
-            ax.set_xlim(x0, x1)
-            ax.set_ylim(y0, y1)
-            ax.set_xlabel("x [m]")
-            ax.set_ylabel("y [m]")
-            ax.set_title(panel.title)
-            if k == 0:
-                _rendered(figure)  # twice: the layout settles only at the second drawing
-                _rendered(figure)
-                figure.set_layout_engine("none")  # nothing moves from here on
+            ax.set(xlim=extent[[0, 2]], ylim=extent[[1, 3]], aspect="auto")
+            ax.set_title(title, fontsize=wishes.size, pad=2.5)
             yield _rendered(figure)
 
 

@@ -10,25 +10,13 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import Normalize
-from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from ..measure.smooth import WORDS, are_smoothed
 from ..read.errors import RequestError
-from ..read.fields import label_of
 from ..read.points import FloatArray, Lattice, find_lattice
 from ..read.run import Frame
-from .style import (
-    DIVERGING,
-    DOUBLE,
-    MAX_HEIGHT,
-    SEQUENTIAL,
-    SINGLE,
-    new_figure,
-    prefix_for,
-    style,
-    with_unit,
-)
+from .style import DIVERGING, MAX_HEIGHT, SEQUENTIAL, prefix_for
 
 # Points of a cloud are first drawn this much larger, which closes the gaps between them
 UNDERLAY = 1.4
@@ -39,7 +27,6 @@ UNDERLAY_DEFORMED = 1.8
 class Panel:
     """What one panel of a row of contours shows."""
 
-    title: str
     points: FloatArray  # (n, 2) reference places [m]
     shift: FloatArray  # (n, 2) displacement times its scale [m]
     size: FloatArray  # (n) side of the cell of each point [m]
@@ -78,7 +65,6 @@ def panel_of(
     field: str = "plastic_strain",
     deformed: float | None = None,
     fictitious: bool = False,
-    title: str | None = None,
 ) -> Panel:
     """The data of one panel; `deformed` is the scale of the displacements, None: reference."""
     run = frame.run
@@ -95,10 +81,7 @@ def panel_of(
     lattice = find_lattice(points, run.spacing)
     volumes = np.abs(run.volumes[keep])
     size = np.full(len(points), run.spacing) if lattice is not None else np.sqrt(volumes)
-    return Panel(
-        frame.label if title is None else title,
-        points, shift, size, values[keep], lattice, outline,
-    )  # fmt: skip
+    return Panel(points, shift, size, values[keep], lattice, outline)
 
 
 def common_scale(
@@ -214,40 +197,19 @@ def common_extent(panels: Sequence[Panel]) -> FloatArray:
     return np.concatenate([low - margin, high + margin])
 
 
-def fill_axes(panels: Sequence[Panel], axes: Sequence[Axes], scale: Scale, columns: int) -> Any:
-    """Draw panels into a grid of axes with common limits; returns what a colour bar needs."""
-    x0, y0, x1, y1 = common_extent(panels)
-    drawn: Any = None
-    for k, (ax, panel) in enumerate(zip(axes, panels)):
-        drawn = draw_panel(ax, panel, scale)
-        ax.set_xlim(x0, x1)
-        ax.set_ylim(y0, y1)
-        ax.locator_params(axis="x", nbins=3 if columns > 2 else 4 if columns > 1 else 6)
-        ax.set_title(panel.title)
-        if k % columns == 0:
-            ax.set_ylabel("y [m]")
-        else:
-            ax.tick_params(labelleft=False)
-        if k + columns >= len(panels):
-            ax.set_xlabel("x [m]")
-        else:
-            ax.tick_params(labelbottom=False)
-    return drawn
-
-
-def grid_for(count: int, aspect: float, width: float) -> tuple[int, int, float]:
-    """Columns, rows and width of a panel [mm] that make the panels largest; one row if legible."""
-    best = (1, count, 0.0)
+def columns_for(count: int, aspect: float, width: float) -> int:
+    """How many panels side by side make them largest; all in one row if that is legible."""
+    best = (1, 0.0)
     for columns in range(1, count + 1):
         rows = -(-count // columns)
         wide = (width - 34.0) / columns - 3.0
         high = (MAX_HEIGHT - 14.0) / rows - 10.0
         size = min(wide, high / aspect, 110.0 / aspect)
         if rows == 1 and wide >= 17.0 and aspect > 0.8:
-            return columns, rows, size
-        if size > best[2]:
-            best = (columns, rows, size)
-    return best
+            return columns
+        if size > best[1]:
+            best = (columns, size)
+    return best[0]
 
 
 def deformation_note(deformed: float | None, frames: Sequence[Frame] = ()) -> str | None:
@@ -257,62 +219,3 @@ def deformation_note(deformed: float | None, frames: Sequence[Frame] = ()) -> st
         return f"Displacements {WORDS}" if smooth else None
     note = f"Deformed shape, displacements × {deformed:g}"
     return f"{note}, {WORDS}" if smooth else note
-
-
-def contour_figure(
-    frames: Sequence[Frame],
-    field: str = "plastic_strain",
-    deformed: float | None = None,
-    fictitious: bool = False,
-    low: float | None = None,
-    high: float | None = None,
-    colours: str | None = None,
-    titles: Sequence[str] | None = None,
-    column: str | None = None,
-) -> Figure:
-    """A row of frames (of one or several runs) on one colour scale.
-
-    field: any field with one number a point. deformed: scale of the displacements, None for the
-    reference shape. low, high: ends of the colour scale in SI units. column: "single" (88 mm) or
-    "double" (180 mm); by default single for one or two panels.
-    """
-    if not frames:
-        raise RequestError("no frame to draw")
-    names = titles if titles is not None else [None] * len(frames)
-    panels = [panel_of(f, field, deformed, fictitious, t) for f, t in zip(frames, names)]
-    unit = frames[0].scalar(field).unit
-    scale = common_scale([p.values for p in panels], unit, low, high, colours)
-    x0, y0, x1, y1 = common_extent(panels)
-    aspect = float((y1 - y0) / (x1 - x0))
-    width = _column_width(column, len(panels))
-    columns, rows, size = grid_for(len(panels), aspect, width)
-    note = deformation_note(deformed, frames)
-    height = rows * (size * aspect + 10.0) + (18.0 if note else 12.0)
-    used = min(width, max(columns * (size + 3.0) + 34.0, 60.0))
-    with style():
-        figure = new_figure(used, min(max(height, 45.0), MAX_HEIGHT), layout="compressed")
-        grid = figure.subplots(rows, columns, squeeze=False)
-        axes = list(grid.flat)
-        for ax in axes[len(panels) :]:
-            ax.set_visible(False)
-        drawn = fill_axes(panels, axes, scale, columns)
-        add_colour_bar(figure, drawn, axes[: len(panels)], field, scale)
-        if note:
-            figure.suptitle(note)
-    return figure
-
-
-def add_colour_bar(figure: Any, drawn: Any, axes: Sequence[Axes], field: str, scale: Scale) -> None:
-    """A colour bar with the name and unit of the field beside the axes."""
-    bar = figure.colorbar(drawn, ax=list(axes), extend=scale.extend, pad=0.02, aspect=25)
-    bar.set_label(with_unit(label_of(field), scale.unit))
-    bar.outline.set_linewidth(0.5)
-
-
-def _column_width(column: str | None, count: int) -> float:
-    if column is None:
-        return SINGLE if count <= 2 else DOUBLE
-    widths = {"single": SINGLE, "double": DOUBLE}
-    if column not in widths:
-        raise RequestError(f"the column must be single or double, not {column!r}")
-    return widths[column]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -16,16 +15,29 @@ from ..measure.smooth import smoothed_for
 from ..read.errors import RequestError
 from ..read.fields import label_of
 from ..read.run import Frame, Run
-from .contours import (
-    add_colour_bar,
-    common_extent,
-    common_scale,
-    deformation_note,
-    draw_panel,
-    fill_axes,
-    panel_of,
+from .contours import columns_for, common_extent, common_scale, deformation_note, panel_of
+from .layout import Place
+from .legends import LegendPlace, best_place, legend, placed
+from .panels import Cell, fill, in_rows, wishes_for
+from .style import (
+    COLOURS,
+    DASHES,
+    DOUBLE,
+    SINGLE,
+    new_figure,
+    prefix_for,
+    readable,
+    style,
+    with_unit,
 )
-from .style import COLOURS, DASHES, DOUBLE, SINGLE, new_figure, prefix_for, style, with_unit
+from .text import LINE, fit_numbers, unit_for, wrapped
+
+# [mm]
+PROFILE, PROFILE_LEFT = 50.0, 17.0  # height of the axes of a profile, and what is left of them
+CURVES, CURVES_LEFT, CURVES_WIDE = 52.0, 17.0, 120.0  # axes of curves below panels
+ASIDE = LegendPlace("aside", DOUBLE, 0.0, longest=34.0)  # of them
+CURVE_BELOW = 11.0  # numbers and name of an axis below
+AXIS_WORDS = 60.0  # longest line of the name of an upright axis
 
 _WORDS = {"strain": "Nominal strain", "axial_stress": "Axial stress", "time": "Time"}
 
@@ -36,7 +48,10 @@ def _words(name: str) -> str:
 
 
 def draw_curves(
-    ax: Axes, curves: Sequence[Curve], y_label: str | None = None, legend: bool = True
+    ax: Axes,
+    curves: Sequence[Curve],
+    y_label: str | None = None,
+    place: LegendPlace | None = None,
 ) -> None:
     """Curves into given axes, with units, prefixes and a sign convention on the axes."""
     if not curves:
@@ -47,7 +62,7 @@ def draw_curves(
     percent = first.x_name == "strain"
     for k, curve in enumerate(curves):
         ax.plot(
-            curve.x * (100.0 if percent else 1.0), curve.y * factor, label=curve.label,
+            curve.x * (100.0 if percent else 1.0), curve.y * factor, label=readable(curve.label),
             color=COLOURS[k % len(COLOURS)], linestyle=DASHES[k % len(DASHES)],
         )  # fmt: skip
     signed = first.y_name == "axial_stress"
@@ -58,11 +73,12 @@ def draw_curves(
         with_unit(_words(first.x_name) + (strain_note if percent else ""),
                   "%" if percent else first.x_unit)
     )  # fmt: skip
-    ax.set_ylabel(with_unit((y_label or _words(first.y_name)) + note, unit))
+    name = with_unit((y_label or _words(first.y_name)) + note, unit)
+    ax.set_ylabel("\n".join(wrapped(name, AXIS_WORDS, 8.0)))
     ax.grid(True, linewidth=0.3, color="0.85")
     ax.set_axisbelow(True)
-    if legend:
-        ax.legend(ncols=2 if len(curves) > 8 else 1)
+    if place is not None:
+        legend(ax, place)
 
 
 def curve_figure(
@@ -72,12 +88,18 @@ def curve_figure(
     column: str = "single",
 ) -> Figure:
     """Curves of one kind in one figure; `marks` puts symbols on the first at these strains."""
+    if not curves:
+        raise RequestError("no curve to draw")
     with style():
+        labels = [curve.label for curve in curves]
         wide = SINGLE if column == "single" else DOUBLE
-        figure = new_figure(wide, 66.0 if column == "single" else 90.0)
+        place = placed(labels, best_place(labels, 4), wide) if len(labels) > 1 else None
+        width, extra = (place.width, place.extra) if place is not None else (wide, 0.0)
+        figure = new_figure(width, (66.0 if column == "single" else 90.0) + extra)
         ax = figure.subplots()
-        draw_curves(ax, curves, y_label, legend=len(curves) > 1)
+        draw_curves(ax, curves, y_label, place)
         _mark(ax, curves[0], marks)
+        fit_numbers(ax)
     return figure
 
 
@@ -85,13 +107,15 @@ def _mark(ax: Axes, curve: Curve, marks: Sequence[float]) -> None:
     factor, _ = prefix_for(
         float(np.nanmax(np.abs(curve.y))) if np.isfinite(curve.y).any() else 0.0, curve.y_unit
     )
+    if marks:
+        ax.margins(x=0.1)
     for strain in marks:
         x = curve.toward(strain)
         y = curve.at(x) * factor
         ax.plot([100.0 * x], [y], "o", color="black", zorder=5)
         ax.annotate(
-            f"{100.0 * strain:g} %", (100.0 * x, y), xytext=(0, 5),
-            textcoords="offset points", fontsize=7, ha="center",
+            f"{100.0 * strain:g} %", (100.0 * x, y), xytext=(3, 3),
+            textcoords="offset points", fontsize=7,
         )  # fmt: skip
 
 
@@ -146,62 +170,66 @@ def column_figure(
 def draw_profile(ax: Axes, measure: BandMeasure) -> None:
     """A profile with its peak, level and width into given axes."""
     profile, width = measure.profile, measure.interpolated
-    ax.plot(profile.distance, profile.values, color=COLOURS[0])
+    factor, unit = unit_for(float(profile.distance[-1]))
+    ax.plot(factor * profile.distance, profile.values, color=COLOURS[0])
     target = width.level * width.peak
     ax.axhline(target, color="0.5", linewidth=0.6, linestyle=":")
-    ax.plot([width.left, width.right], [target, target], color=COLOURS[1], marker="|", ms=7)
-    ax.plot([width.peak_distance], [width.peak], "o", color=COLOURS[1], ms=3)
-    sign = "" if width.closed else "≥ "
-    text = (
-        f"width at {100.0 * width.level:g} % of the peak\n"
-        f"between points {sign}{width.width:.3f} m ± {width.uncertainty:.2g} m\n"
-        f"fitted along the band {measure.width:.3f} m\n"
-        f"peak {width.peak:.3g}"
-    )
-    right = width.peak_distance < 0.5 * profile.distance[-1]
-    ax.annotate(
-        text, (0.97 if right else 0.03, 0.96), xycoords="axes fraction",
-        ha="right" if right else "left", va="top", fontsize=7,
-    )  # fmt: skip
-    (x0, y0), (x1, y1) = profile.line
-    ax.set_xlabel(
-        "Distance along the line [m]\n"
-        f"from ({x0 + 0.0:.3f}, {y0 + 0.0:.3f}) m\nto ({x1 + 0.0:.3f}, {y1 + 0.0:.3f}) m"
-    )
+    ends = [factor * width.left, factor * width.right]
+    ax.plot(ends, [target, target], color=COLOURS[1], marker="|", ms=7)
+    ax.plot([factor * width.peak_distance], [width.peak], "o", color=COLOURS[1], ms=3)
+    ax.set_xlabel(f"Distance along the line [{unit}]")
     ax.set_ylabel(with_unit(label_of(profile.name), profile.unit))
-    ax.set_xlim(0.0, float(profile.distance[-1]))
+    ax.set_xlim(0.0, factor * float(profile.distance[-1]))
     highest = np.nanmax(profile.values)
-    ax.set_ylim(0.0, 1.3 * highest if highest > 0.0 else None)  # room for the text above the peak
+    ax.set_ylim(0.0, 1.06 * highest if highest > 0.0 else None)
+
+
+def band_words(measure: BandMeasure) -> str:
+    """The numbers of a band in short lines."""
+    width, strong = measure.interpolated, measure.bands.prevailing
+    factor, unit = unit_for(float(measure.profile.distance[-1]))
+    between, fitted = factor * width.width, factor * measure.width
+    sign = "" if width.closed else "≥ "
+    ends = [f"({factor * x:.4g}, {factor * y:.4g})" for x, y in measure.profile.line]
+    return (
+        f"Prevailing band, {strong.angle:.1f}° ± {strong.angle_uncertainty:.1f}° to the loading "
+        f"axis\nweaker over stronger band {measure.bands.ratio:.2f}\n"
+        f"width at {100.0 * width.level:g} % of the peak of {width.peak:.3g}:\n"
+        f"between points {sign}{between:.4g} {unit} ± {factor * width.uncertainty:.2g} {unit}, "
+        f"fitted along the band {fitted:.4g} {unit}\n"
+        f"line from {ends[0]} {unit} to {ends[1]} {unit}"
+    )
 
 
 def band_figure(run: Run, measure: BandMeasure) -> Figure:
-    """Where the bands lie (left) and the profile across the prevailing one (right)."""
+    """Where the bands lie, and the profile across the prevailing one beside or below it."""
     frame = run.frame(number=measure.frame)
     panel = panel_of(frame)
     scale = common_scale([panel.values], frame.scalar("plastic_strain").unit)
-    x0, y0, x1, y1 = common_extent([panel])
-    aspect = float((y1 - y0) / (x1 - x0))
-    tall = min(95.0, 70.0 * aspect)
+    extent = common_extent([panel])
+    beside = extent[3] - extent[1] > 0.6 * (extent[2] - extent[0])
+    cell = Cell(frame.label, extent, panel, lambda ax: _draw_bands(ax, measure))
     with style():
-        figure = new_figure(DOUBLE, tall + 18.0)
-        left_width = tall / aspect + 45.0
-        parts: Any = figure.subfigures(1, 2, width_ratios=[left_width, DOUBLE - left_width])
-        left, right = parts[0].subplots(), parts[1].subplots()
-        drawn = draw_panel(left, panel, scale)
-        add_colour_bar(parts[0], drawn, [left], "plastic_strain", scale)
-        _draw_bands(left, measure)
-        left.set_xlim(x0, x1)
-        left.set_ylim(y0, y1)
-        left.set_xlabel("x [m]")
-        left.set_ylabel("y [m]")
-        left.locator_params(axis="x", nbins=4)
-        left.set_title(panel.title)
-        draw_profile(right, measure)
-        strong = measure.bands.prevailing
-        right.set_title(
-            f"Prevailing band\n{strong.angle:.1f}° ± {strong.angle_uncertainty:.1f}° to the "
-            f"loading axis\nweaker over stronger band {measure.bands.ratio:.2f}"
-        )
+        rows = in_rows([cell], 1)
+        wishes = wishes_for(rows, SINGLE if beside else DOUBLE, 95.0)
+        layout = rows.layout(wishes, scale)
+        words = band_words(measure).splitlines()
+        wide = DOUBLE - layout.width - PROFILE_LEFT if beside else 0.5 * DOUBLE
+        lines = [part for line in words for part in wrapped(line, wide - 2.0, 7.0)]
+        head = len(lines) * LINE * 7.0 + 4.0
+        start = 2.0 if beside else layout.height + 3.0
+        tall = max(PROFILE, layout.height - head - start - CURVE_BELOW if beside else 0.0)
+        height = max(layout.height, start + head + tall + CURVE_BELOW)
+        layout = layout.in_figure(DOUBLE, height)
+        figure = new_figure(DOUBLE, height, layout=None)
+        fill(figure, layout, rows, wishes, scale, "plastic_strain")
+        left = DOUBLE - wide - 3.0 if beside else PROFILE_LEFT
+        figure.text(left / DOUBLE, 1.0 - start / height, "\n".join(lines), fontsize=7, va="top",
+                    linespacing=1.2)  # fmt: skip
+        place = Place(left, start + head + tall, wide, tall, "", True)
+        ax = figure.add_axes(layout.box(place))
+        draw_profile(ax, measure)
+        fit_numbers(ax)
     return figure
 
 
@@ -219,21 +247,27 @@ def profile_figure(measures: Sequence[BandMeasure], labels: Sequence[str] | None
     """Profiles of several frames or runs over the distance from their peaks."""
     names = labels or [m.label for m in measures]
     first = measures[0].profile
+    factor, unit = unit_for(max(float(np.ptp(m.profile.distance)) for m in measures))
+    words = [
+        f"{name}: {factor * m.interpolated.width:.4g} {unit}" for m, name in zip(measures, names)
+    ]
+    title = f"width between points at {100.0 * measures[0].interpolated.level:g} % of the peak"
     with style():
-        figure = new_figure(SINGLE, 66.0)
+        place = placed(words, best_place(words, 4), title=title)
+        figure = new_figure(place.width, 66.0 + place.extra)
         ax = figure.subplots()
-        for k, (m, name) in enumerate(zip(measures, names)):
+        for k, m in enumerate(measures):
             ax.plot(
-                m.profile.distance - m.interpolated.peak_distance, m.profile.values,
+                factor * (m.profile.distance - m.interpolated.peak_distance), m.profile.values,
                 color=COLOURS[k % len(COLOURS)], linestyle=DASHES[k % len(DASHES)],
-                label=f"{name}: {m.interpolated.width:.3f} m",
+                label=readable(words[k]),
             )  # fmt: skip
-        ax.set_xlabel("Distance from the peak along the line [m]")
+        ax.set_xlabel(f"Distance from the peak along the line [{unit}]")
         ax.set_ylabel(with_unit(label_of(first.name), first.unit))
         ax.set_ylim(bottom=0.0)
-        level = 100.0 * measures[0].interpolated.level
-        ax.legend(title=f"width between points at {level:g} % of the peak",
-                  title_fontsize=7)  # fmt: skip
+        ax.locator_params(axis="x", nbins=7)
+        legend(ax, place, title)
+        fit_numbers(ax)
     return figure
 
 
@@ -255,35 +289,31 @@ def compare_figure(
     if smooth:
         frames = [smoothed_for(frame, field, deformed) for frame in frames]
     titles = [f"{n}\n{f.label}" for n, f in zip(names, frames)]
-    panels = [panel_of(f, field, deformed, False, t) for f, t in zip(frames, titles)]
+    panels = [panel_of(f, field, deformed) for f in frames]
     scale = common_scale([p.values for p in panels], frames[0].scalar(field).unit, low, high)
     curves = [
         stress_strain(r, tension_positive, label=n)
         for r, n in zip(runs, names)
         if r.platens is not None and r.has_history
     ]
-    x0, y0, x1, y1 = common_extent(panels)
-    aspect = float((y1 - y0) / (x1 - x0))
-    columns = min(len(panels), 6)
-    rows = -(-len(panels) // columns)
-    size = min((DOUBLE - 34.0) / columns - 3.0, 80.0 / aspect if rows == 1 else 60.0 / aspect)
-    top = rows * (size * aspect + 15.0) + 14.0
-    low_part = 66.0 if curves else 0.0
+    extent = common_extent(panels)
+    cells = [Cell(title, extent, panel) for title, panel in zip(titles, panels)]
     with style():
-        figure = new_figure(DOUBLE, top + low_part)
-        parts: Any = [figure]
+        aspect = float((extent[3] - extent[1]) / (extent[2] - extent[0]))
+        columns = columns_for(len(cells), aspect, DOUBLE)
+        rows = in_rows(cells, columns, deformation_note(deformed, frames))
+        wishes = wishes_for(rows, DOUBLE, 80.0 if columns == len(cells) else 60.0)
+        layout = rows.layout(wishes, scale)
+        top = layout.height
         if curves:
-            parts = figure.subfigures(2, 1, height_ratios=[top, low_part])
-        axes = list(parts[0].subplots(rows, columns, squeeze=False).flat)
-        for ax in axes[len(panels) :]:
-            ax.set_visible(False)
-        drawn = fill_axes(panels, axes, scale, columns)
-        add_colour_bar(parts[0], drawn, axes[: len(panels)], field, scale)
-        note = deformation_note(deformed, frames)
-        if note:
-            parts[0].suptitle(note)
+            layout = layout.in_figure(DOUBLE, top + 4.0 + CURVES + CURVE_BELOW)
+        figure = new_figure(layout.width, layout.height, layout=None)
+        fill(figure, layout, rows, wishes, scale, field)
         if curves:
-            draw_curves(parts[1].subplots(), curves)
+            place = Place(CURVES_LEFT, top + 4.0 + CURVES, CURVES_WIDE, CURVES, "", True)
+            ax = figure.add_axes(layout.box(place))
+            draw_curves(ax, curves, None, ASIDE)
+            fit_numbers(ax)
     return figure
 
 

@@ -13,10 +13,14 @@ from matplotlib.patches import Circle
 
 from ..read.points import FloatArray
 from ..read.points_file import BODY, ModelPoints
-from .style import COLOURS, DOUBLE, MAX_HEIGHT, MM, new_figure, style
+from .layout import BAR, NARROWEST, Wishes, arranged
+from .panels import number_axes
+from .style import COLOURS, DOUBLE, MAX_HEIGHT, MM, new_figure, readable, style
+from .text import LINE, length_unit, text_width, wrapped
 
 SOIL = ["#C9B79C", "#8C7B65", "#E3D5B8", "#A89078", "#6E6257", "#D9C2A0"]
-BESIDE = 45.0  # width of the legend [mm]
+BESIDE = 40.0  # longest line of words in the legend [mm]
+POINT_ROOM = 400.0  # size of the body on paper [points], about
 ARROWS = 25  # of a load, at most
 
 
@@ -24,24 +28,35 @@ def geometry_figure(model: ModelPoints, title: str = "") -> Figure:
     """Points by material, fictitious points by boundary, loads and patches with their names."""
     low = model.positions.min(axis=0) - model.spacing
     high = model.positions.max(axis=0) + model.spacing
-    wide = DOUBLE - BESIDE - 20.0
-    height = min(MAX_HEIGHT, max(55.0, wide * (high[1] - low[1]) / (high[0] - low[0]) + 20.0))
+    extent = np.concatenate([low, high])
     with style():
-        # for axes of one scale: others are laid out before their ticks are known, and labels cut
-        figure = new_figure(DOUBLE, height, "compressed")
+        figure = new_figure(DOUBLE, MAX_HEIGHT, layout=None)
         axes = figure.add_subplot()
-        entries = _draw_points(axes, model, wide * MM * 72.0 / (high[0] - low[0]))
+        axes.set_aspect("equal")
+        entries = _draw_points(axes, model, POINT_ROOM / float((high - low).max()))
         for kind, draw in THINGS.items():
             for k, (name, rows) in enumerate(model.things.get(kind, {}).items()):
                 entries.append(draw(axes, name, rows, k, float((high - low).max())))
+        words = ["\n".join(wrapped(str(entry.get_label()), BESIDE, 7.0)) for entry in entries]
+        beside = max(text_width(text, 7.0) for text in words) + 9.0
+        wishes = Wishes(DOUBLE - beside + BAR, bar=0.0, tallest=MAX_HEIGHT, size=8.0)
+        layout = arranged([[extent]], [[readable(title)]], wishes)
+        right = max(layout.right, layout.left + NARROWEST) + 3.0
+        rows_high = sum(text.count("\n") + 1.6 for text in words) * LINE * 7.0
+        layout = layout.in_figure(right + beside, max(layout.panels_end, rows_high + 6.0))
+        figure.set_size_inches(layout.width * MM, layout.height * MM)
+        place = layout.rows[0][0]
+        axes.set_position(layout.box(place))
+        unit = length_unit([extent])
+        number_axes(axes, extent, place, unit, 7.0)
         axes.set_aspect("equal")
-        axes.set_xlim(low[0], high[0])
-        axes.set_ylim(low[1], high[1])
-        axes.set_xlabel("x [m]")
-        axes.set_ylabel("y [m]")
-        if title:
-            axes.set_title(title)
-        figure.legend(handles=entries, loc="outside right upper")
+        axes.set_xlabel(f"x [{unit[1]}]", labelpad=1.5)
+        axes.set_ylabel(f"y [{unit[1]}]", labelpad=1.5)
+        axes.set_title(place.title, fontsize=8.0, pad=2.5)
+        figure.legend(
+            handles=entries, labels=words, loc="upper left", borderaxespad=0.0, borderpad=0.2,
+            bbox_to_anchor=(right / layout.width, 1.0 - 2.0 / layout.height),
+        )  # fmt: skip
     return figure
 
 
@@ -73,7 +88,7 @@ def _discs(
         offset_transform=axes.transData, facecolors=colour, edgecolors="0.3", linewidths=thin,
     ))  # fmt: skip
     return Line2D([], [], marker="o", linestyle="none", color=colour,
-                  label=f"{name}, {len(size)} points")  # fmt: skip
+                  label=readable(f"{name}, {len(size)} points"))  # fmt: skip
 
 
 def _draw_load(axes: Axes, name: str, rows: FloatArray, k: int, extent: float) -> Line2D:
@@ -100,7 +115,7 @@ def _draw_patch(axes: Axes, name: str, rows: FloatArray, k: int, extent: float) 
     for x, y, radius in rows:
         axes.add_patch(Circle((x, y), max(radius, 0.004 * extent), fill=False, linestyle="--",
                               linewidth=1.0, color=COLOURS[1 + k], zorder=5))  # fmt: skip
-    return Line2D([], [], linestyle="--", color=COLOURS[1 + k], label=name)
+    return Line2D([], [], linestyle="--", color=COLOURS[1 + k], label=readable(name))
 
 
 # How each kind of line of the file is drawn: name, its rows, number of the name, extent [m].

@@ -32,6 +32,7 @@ import numpy.typing as npt
 
 from ..read.errors import NoBandError, RequestError
 from ..read.points import BoolArray, FloatArray, PointSet
+from ..read.shown import Short
 from .sampling import interpolate
 
 Line = tuple[tuple[float, float], tuple[float, float]]
@@ -40,8 +41,8 @@ LEVEL = 0.10  # of the peak, where the width is taken
 NO_STRAIN = 1.0e-12  # plastic strain below this is none
 
 
-@dataclass(frozen=True)
-class Profile:
+@dataclass(frozen=True, repr=False)
+class Profile(Short):
     """Values along a straight line from `line[0]` to `line[1]`."""
 
     line: Line
@@ -78,8 +79,8 @@ class FittedWidth:
     level: float  # part of the peak
 
 
-@dataclass(frozen=True)
-class Band:
+@dataclass(frozen=True, repr=False)
+class Band(Short):
     """One band: the straight line fitted to its ridge, and what is found along it."""
 
     direction: str  # "rising" | "falling"
@@ -100,8 +101,8 @@ class Band:
     used: BoolArray = field(repr=False)  # (k) False near ends and crossing
 
 
-@dataclass(frozen=True)
-class BandSystem:
+@dataclass(frozen=True, repr=False)
+class BandSystem(Short):
     """The two bands of a field; `prevailing` is the stronger."""
 
     prevailing: Band
@@ -234,8 +235,8 @@ def crossing_angle(one: Line, two: Line) -> float:
     return float(np.degrees(np.arccos(min(cosine, 1.0))))
 
 
-@dataclass(frozen=True)
-class BandMeasure:
+@dataclass(frozen=True, repr=False)
+class BandMeasure(Short):
     """All that is measured of the bands of one frame."""
 
     label: str

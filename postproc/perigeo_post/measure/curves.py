@@ -10,13 +10,14 @@ import numpy as np
 from ..read.errors import RequestError
 from ..read.points import BoolArray, FloatArray
 from ..read.run import Run
+from ..read.shown import Short
 
 MODULUS_RANGE = (2.0e-4, 1.0e-3)  # nominal strain, between which the modulus is fitted
 ENERGY_UNITS = ("J/m", "J")
 
 
-@dataclass(frozen=True)
-class Curve:
+@dataclass(frozen=True, repr=False)
+class Curve(Short):
     """One quantity against another."""
 
     label: str

@@ -42,9 +42,9 @@ def plain(value: Any) -> Any:
     return value
 
 
-def to_json(value: Any) -> str:
+def to_json(value: Any, only_ascii: bool = False) -> str:
     """JSON text of numbers and tables."""
-    return json.dumps(plain(value), indent=2, ensure_ascii=False, allow_nan=False)
+    return json.dumps(plain(value), indent=2, ensure_ascii=only_ascii, allow_nan=False)
 
 
 def write_rows(
@@ -126,3 +126,18 @@ def write_points(path: str | Path, frames: Sequence[Frame], name: str) -> Path:
             for (x, y), b, value in zip(frame.run.positions, frame.run.boundary, field.values)
         ]  # fmt: skip
     return write_rows(path, rows, {"strain": "1", "time": "s", "x": "m", "y": "m", name: unit})
+
+
+def write_frame(path: str | Path, frame: Frame, names: Sequence[str]) -> Path:
+    """All points of a frame with these fields, components of their own columns; one row a point."""
+    run = frame.run
+    columns: dict[str, Any] = {"x": run.positions[:, 0], "y": run.positions[:, 1]}
+    columns.update(volume=run.volumes, boundary=run.boundary.tolist())
+    units = {"x": "m", "y": "m", "volume": "m^2"}
+    for name in names:
+        field = frame.field(name)
+        parts = [field.component(c) for c in field.components] or [field]
+        columns.update({part.name: part.values for part in parts})
+        units.update({part.name: part.unit for part in parts})
+    rows = [dict(zip(columns, values)) for values in zip(*columns.values())]
+    return write_rows(path, rows, units)

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..read.points import BoolArray, FloatArray, Lattice, PointSet
+from ..surroundings import import_matplotlib
 
 
 def interpolate(
@@ -31,6 +32,7 @@ def interpolate(
 @lru_cache(maxsize=4)  # a band is searched with many lines over the same points
 def _triangles(points: PointSet) -> Any:
     # Only a cloud needs matplotlib here: what measures a lattice works without it.
+    import_matplotlib()
     from matplotlib.tri import Triangulation
 
     triangles = Triangulation(points.points[:, 0], points.points[:, 1])

@@ -10,6 +10,7 @@ import numpy as np
 
 from .errors import FieldNotFoundError
 from .points import FloatArray
+from .shown import Short
 
 TENSOR = ("xx", "yy", "zz", "xy")
 # Of the fields of schema 1, for files whose datasets do not say
@@ -31,8 +32,8 @@ class About:
     components: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True)
-class Field:
+@dataclass(frozen=True, repr=False)
+class Field(Short):
     """Values at all points with their meaning."""
 
     name: str

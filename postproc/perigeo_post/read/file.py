@@ -6,6 +6,7 @@ program is never disturbed.
 
 from __future__ import annotations
 
+import math
 import os
 import time
 from collections.abc import Callable, Iterator
@@ -15,6 +16,7 @@ from typing import Any, TypeVar
 
 import h5py
 import numpy as np
+import numpy.typing as npt
 
 from .errors import ResultError, SchemaError
 from .fields import FIRST_COMPONENTS, About, Field
@@ -32,7 +34,9 @@ def _opened(path: Path) -> Iterator[Any]:
     try:
         try:
             file = h5py.File(path, "r", locking=False)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OSError):
+            # An older h5py has no such argument; a file that this process holds open with a lock,
+            # as h5py and meshio do it, can be opened once more only in the same way.
             file = h5py.File(path, "r")
     except OSError as error:
         raise ResultError(_why_not(path, error)) from error
@@ -55,9 +59,15 @@ def text_of(value: Any) -> str:
     """A string of the file, however it is stored."""
     if isinstance(value, np.ndarray) and value.size == 1:
         value = value.reshape(-1)[0]
-    if isinstance(value, bytes):
-        return value.decode("utf-8", errors="replace")
-    return str(value)
+    return decoded(value) if isinstance(value, bytes) else str(value)
+
+
+def decoded(text: bytes) -> str:
+    """Text that is UTF-8 or, where it cannot be that, Latin-1, which takes every byte."""
+    try:
+        return text.decode("utf-8")
+    except UnicodeDecodeError:
+        return text.decode("latin-1")
 
 
 def plain(value: Any) -> Any:
@@ -86,8 +96,12 @@ def read(path: Path, what: Callable[[Any], T]) -> T:
         except (OSError, RuntimeError) as error:
             if attempt == _ATTEMPTS - 1:
                 raise ResultError(f"{path} is damaged: {str(error).splitlines()[0]}") from error
-        except (KeyError, ValueError) as error:
+        except KeyError as error:
             raise ResultError(f"{path} is not complete: {error.args[0]}") from error
+        except (TypeError, ValueError, IndexError, AttributeError, OverflowError) as error:
+            # The program writes none of what leads here.
+            words = str(error).splitlines() or [type(error).__name__]
+            raise ResultError(f"{path} is damaged: {words[0]}") from error
         time.sleep(_PAUSE)
     raise AssertionError
 
@@ -140,15 +154,51 @@ def about_dataset(data: Any, name: str) -> About:
     return About(text_attribute(data, "unit"), text_attribute(data, "description"), parts)
 
 
-def dataset(path: Path, key: str, name: str) -> Field | None:
-    """A dataset with its unit, description and components; None where it is not there."""
+def numbers_in(file: Any, key: str, shape: tuple[int | None, ...]) -> npt.NDArray[Any]:
+    """The numbers of a dataset, of that shape (None: any number); a ValueError where it is not."""
+    data = file[key]
+    if not isinstance(data, h5py.Dataset):
+        raise ValueError(f"/{key} is no array")
+    if data.dtype.kind not in "iufb":
+        raise ValueError(f"/{key} holds no numbers")
+    fits = len(data.shape) == len(shape)
+    if not fits or any(w is not None and w != n for w, n in zip(shape, data.shape)):
+        wanted = " x ".join("n" if n is None else str(n) for n in shape)
+        found = " x ".join(map(str, data.shape)) or "one"
+        raise ValueError(f"/{key} holds {found} numbers, not {wanted}")
+    return np.asarray(data[()])
+
+
+def point_arrays(file: Any) -> dict[str, npt.NDArray[Any]]:
+    """Positions, volumes and boundaries of the points; a ValueError where they do not agree."""
+    position = numbers_in(file, "points/position", (None, 2))
+    if not np.isfinite(position).all():
+        raise ValueError("/points/position holds what is no number")
+    found = {"position": position}
+    for name in ("volume", "boundary"):
+        found[name] = numbers_in(file, f"points/{name}", (len(position),))
+    return found
+
+
+def strength_reduction(file: Any) -> tuple[float, float] | None:
+    """A factor that is borne and one that is not; None where they were not sought."""
+    if "strength_reduction" not in file:
+        return None
+    about = file["strength_reduction"].attrs
+    borne, not_borne = float(about["borne"]), float(about["not_borne"])
+    return borne, not_borne if not_borne < 1.0e300 else math.inf
+
+
+def dataset(path: Path, key: str, name: str, points: int) -> Field | None:
+    """A dataset of the points: unit, description, components; None where it is not there."""
 
     def find(file: Any) -> Field | None:
         if key not in file:
             return None
         data = file[key]
+        shape = (points, None) if isinstance(data, h5py.Dataset) and data.ndim == 2 else (points,)
+        values = numbers_in(file, key, shape).astype(float)
         about = about_dataset(data, name)
-        values = np.asarray(data[()], dtype=float)
         return Field(name, values, about.unit, about.description, about.components)
 
     return read(path, find)

@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .errors import FieldNotFoundError, ResultError
-from .file import plain, read, text_attribute
+from .file import numbers_in, plain, read, text_attribute
 from .first_schema import column_meaning
 
 FloatArray = npt.NDArray[np.float64]
@@ -82,7 +82,9 @@ class History(Mapping[str, FloatArray]):
         return History(self._columns, self.path, other._meanings)
 
     def __repr__(self) -> str:
-        return f"History({self.rows} rows: {', '.join(self._columns)})"
+        names = list(self._columns)
+        shown = names if len(names) <= 6 else [*names[:5], f"... {len(names) - 5} more"]
+        return f"History({self.rows} rows: {', '.join(shown)})"
 
 
 def read_history(path: str | Path) -> History:
@@ -153,7 +155,10 @@ def stored_history(path: Path) -> StoredHistory | None:
         meanings: dict[str, Column] = {}
         for name in str(about["columns"]).split():
             data = group[name]
-            columns[name] = np.asarray(data[:written], dtype=float)
+            values = numbers_in(file, f"history/{name}", (None,))
+            if not 0 <= written <= len(values):
+                raise ValueError(f"/history/{name} has {len(values)} of {written} rows")
+            columns[name] = values[:written].astype(float)
             meanings[name] = Column(
                 text_attribute(data, "unit"), text_attribute(data, "description")
             )

@@ -15,7 +15,7 @@ from .errors import OutputError
 
 HDF5 = b"\x89HDF\r\n\x1a\n"
 CHECKPOINT = b"perigeo checkpoint"  # in front of the HDF5 part
-FIGURES = (b"\x89PNG\r\n\x1a\n", b"%PDF-", b"GIF87a", b"GIF89a")
+FIGURES = (b"\x89PNG\r\n\x1a\n", b"%PDF-", b"%!PS-Adobe", b"GIF87a", b"GIF89a")
 _GROUP = re.compile(rb"^[ \t]*&[a-z_]+\b", re.MULTILINE | re.IGNORECASE)
 _HEAD = 65536  # bytes of a file that are looked at
 
@@ -64,6 +64,8 @@ def _kind_of(head: bytes, path: Path) -> str:
     if head.startswith(HDF5):
         return "result"
     if head.startswith(FIGURES) or head[4:8] == b"ftyp":  # the latter: MP4
+        return FIGURE
+    if head.lstrip().startswith(b"<?xml") and b"<svg" in head:
         return FIGURE
     if head.lstrip().lower().startswith(b"<!doctype html"):
         return PAGE

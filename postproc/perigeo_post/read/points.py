@@ -8,6 +8,8 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from .shown import Short
+
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int64]
 BoolArray = npt.NDArray[np.bool_]
@@ -16,8 +18,8 @@ LATTICE_TOLERANCE = 1.0e-3  # of the spacing
 MAX_EMPTY = 50  # a lattice with more cells than this per point is taken for a cloud
 
 
-@dataclass(frozen=True)
-class Lattice:
+@dataclass(frozen=True, repr=False)
+class Lattice(Short):
     """Square lattice on which a set of points lies; nodes may be empty."""
 
     origin: tuple[float, float]
@@ -82,6 +84,9 @@ class PointSet:
             if self.lattice is not None
             else float(np.sqrt(np.median(self.volumes)))
         )
+
+    def __repr__(self) -> str:
+        return f"PointSet({len(self.points)} points)"
 
     def _mean_distance(self) -> float:
         extent = np.ptp(self.points, axis=0)

@@ -6,9 +6,8 @@ program is never disturbed. What the program has not yet written is not shown.
 
 from __future__ import annotations
 
-import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -21,15 +20,27 @@ import numpy.typing as npt
 from . import fields as _fields
 from .errors import FieldNotFoundError, FrameNotFoundError, ResultError
 from .fields import About, Field
-from .file import about_dataset, checked_attributes, dataset, plain, read, text_of
+from .file import (
+    about_dataset,
+    checked_attributes,
+    dataset,
+    plain,
+    point_arrays,
+    read,
+    strength_reduction,
+    text_of,
+)
 from .history import History, read_history, stored_history, with_later_rows
+from .labels import labels_of, listed
 from .points import BoolArray, FloatArray, PointSet
+from .shown import Short
+from .to_xarray import to_xarray
 
 T = TypeVar("T")
 
 
-@dataclass(frozen=True)
-class Frame:
+@dataclass(frozen=True, repr=False)
+class Frame(Short):
     """One stored state of a run. ``frame["stress_xx"]`` is the array of a field."""
 
     run: Run
@@ -43,11 +54,8 @@ class Frame:
 
     @property
     def label(self) -> str:
-        """Strain where the run has platens, else time."""
-        text = f"t = {self.time:.4g} s"
-        if np.isfinite(self.strain):
-            text = f"ε = {100.0 * self.strain:.3g} %"
-        return text if self.valid else f"{text} (failing state)"
+        """Strain where the run has platens and it tells anything, else time."""
+        return labels_of([self])[0]
 
     def field(self, name: str) -> Field:
         """A stored or derived field with unit, description and components."""
@@ -78,9 +86,10 @@ class Frame:
         return np.asarray(active.values > 0.5)
 
     def _stored(self, name: str) -> Field | None:
-        found = dataset(self.run.path, f"{self.key}/{name}", name)
+        points = len(self.run.volumes)
+        found = dataset(self.run.path, f"{self.key}/{name}", name, points)
         if found is None and name in _fields.OF_THE_POINTS:
-            found = dataset(self.run.path, f"points/{name}", name)
+            found = dataset(self.run.path, f"points/{name}", name, points)
         return found
 
 
@@ -96,7 +105,7 @@ class Run:
         self.attributes: dict[str, Any] = self._read(
             lambda file: checked_attributes(self.path, file)
         )
-        self._points: dict[str, Any] = {}
+        self._points: dict[str, npt.NDArray[Any]] = {}
 
     def __enter__(self) -> Run:
         return self
@@ -116,9 +125,10 @@ class Run:
         return read(self.path, what)
 
     def _array(self, name: str) -> npt.NDArray[Any]:
-        if name not in self._points:
-            self._points[name] = self._read(lambda file: file[name][()])
-        return np.asarray(self._points[name])
+        """An array of the points, with as many rows as there are positions."""
+        if not self._points:
+            self._points = self._read(point_arrays)
+        return self._points[name]
 
     # ---- what the run is -----------------------------------------------------------------
 
@@ -162,9 +172,9 @@ class Run:
         return self._corner("upper", np.max)
 
     def _corner(self, key: str, extreme: Any) -> FloatArray:
-        given = np.asarray(self.attributes.get(key, []), dtype=float)
-        if given.shape == (2,) and np.isfinite(given).all():
-            return given
+        given = np.asarray(self.attributes.get(key, []))
+        if given.shape == (2,) and given.dtype.kind in "iuf" and np.isfinite(given).all():
+            return given.astype(float)
         return np.asarray(extreme(self.positions[self.body], axis=0), dtype=float)
 
     @property
@@ -194,9 +204,15 @@ class Run:
         return {key: self.attributes[key] for key in keys.split() if key in self.attributes}
 
     @cached_property
+    def input_bytes(self) -> bytes:
+        """The namelist byte for byte, as it was given."""
+        text = self._read(lambda file: file["input/namelist"][()])
+        return text if isinstance(text, bytes) else text_of(text).encode()
+
+    @cached_property
     def input_text(self) -> str:
-        """The namelist, as it was given."""
-        return text_of(self._read(lambda file: file["input/namelist"][()]))
+        """The namelist as text; what is no UTF-8 is taken for Latin-1."""
+        return text_of(self.input_bytes)
 
     @cached_property
     def values(self) -> dict[str, str]:
@@ -212,14 +228,7 @@ class Run:
     def factor_of_safety(self) -> tuple[float, float] | None:
         """A factor that is borne and one that is not (infinite: all are); None if not sought."""
 
-        def read(file: Any) -> tuple[float, float] | None:
-            if "strength_reduction" not in file:
-                return None
-            about = file["strength_reduction"].attrs
-            borne, not_borne = float(about["borne"]), float(about["not_borne"])
-            return borne, not_borne if not_borne < 1.0e300 else math.inf
-
-        return self._read(read)
+        return self._read(strength_reduction)
 
     def value(self, key: str) -> str | None:
         """A value as used; the first where its group stands several times; None if absent."""
@@ -242,17 +251,17 @@ class Run:
     @property
     def positions(self) -> FloatArray:
         """Reference positions of all points (n, 2) [m]."""
-        return np.asarray(self._array("points/position"), dtype=float)
+        return np.asarray(self._array("position"), dtype=float)
 
     @property
     def volumes(self) -> FloatArray:
         """Volumes of all points per unit thickness (n) [m^2]."""
-        return np.asarray(self._array("points/volume"), dtype=float)
+        return np.asarray(self._array("volume"), dtype=float)
 
     @property
     def boundary(self) -> npt.NDArray[np.int64]:
         """Boundary of each point (n): 0 for the body, k for the k-th boundary."""
-        return np.asarray(self._array("points/boundary"), dtype=np.int64)
+        return np.asarray(self._array("boundary"), dtype=np.int64)
 
     @property
     def body(self) -> BoolArray:
@@ -347,11 +356,11 @@ class Run:
             for state in frames:
                 if state.number == number:
                     return state
-            raise FrameNotFoundError(f"{self.path} has no frame {number}; {_listed(frames)}")
+            raise FrameNotFoundError(f"{self.path} has no frame {number}; {listed(frames)}")
         if strain is not None and self.strain_axis is None:
             raise FrameNotFoundError(
                 f"{self.path} has no platens, so no nominal strain: ask for a time; "
-                f"{_listed(frames)}"
+                f"{listed(frames)}"
             )
         wanted = strain if strain is not None else time
         assert wanted is not None
@@ -364,7 +373,7 @@ class Run:
         away = np.where(np.isfinite(there), np.abs(there - wanted), np.inf)
         if len(away) == 0 or away.min() > tolerance:
             what = f"strain {wanted:g}" if strain is not None else f"time {wanted:g} s"
-            raise FrameNotFoundError(f"{self.path} has no frame at {what}; {_listed(frames)}")
+            raise FrameNotFoundError(f"{self.path} has no frame at {what}; {listed(frames)}")
         return frames[int(away.argmin())]
 
     @cached_property
@@ -392,17 +401,28 @@ class Run:
         """Names of all fields: of the frames, stored and derived, and of the points."""
         return _fields.available(self.stored_fields)
 
+    def to_xarray(self, fields: Sequence[str] | None = None) -> Any:
+        """The valid frames as an xarray.Dataset, which is an extra of its own.
+
+        Dimensions frame, point and the components of each field; coordinates time, nominal_strain,
+        x, y, volume and boundary. `fields`: names, all stored fields by default.
+        """
+        return to_xarray(self, fields or list(self.stored_fields))
+
     # ---- history -------------------------------------------------------------------------
 
     @property
     def history_path(self) -> Path:
-        """The history in CSV form: beside the .h5, with its stem (or the name of the run)."""
-        beside = self.path.with_name(f"{self.path.stem}_history.csv")
-        if not beside.exists():
-            named = self.path.with_name(f"{self.name}_history.csv")
-            if named.exists():
-                return named
-        return beside
+        """The history in CSV form: beside the .h5, with its stem (or the name of the run).
+
+        Where the .h5 is a symbolic link, also beside what it leads to.
+        """
+        folders = (self.path, self.path.resolve())
+        choices = [
+            *(path.with_name(f"{path.stem}_history.csv") for path in folders),
+            *(path.with_name(f"{self.name}_history.csv") for path in folders),
+        ]
+        return next((path for path in choices if path.exists()), choices[0])
 
     @property
     def has_history(self) -> bool:
@@ -423,17 +443,3 @@ class Run:
         if not csv.exists():
             raise ResultError(f"the history {csv} is missing")
         return read_history(csv)
-
-
-def _listed(frames: list[Frame]) -> str:
-    if not frames:
-        return "no frame is written yet"
-    shown = [
-        (f"{f.strain:.6g}" if np.isfinite(f.strain) else f"{f.time:.6g} s")
-        + f" ({'failed' if f.number is None else f.number})"
-        for f in frames
-    ]
-    if len(shown) > 16:
-        shown = [*shown[:8], "...", *shown[-7:]]
-    kind = "strain" if np.isfinite(frames[0].strain) else "time"
-    return f"there are, by {kind} (number): {', '.join(shown)}"

@@ -4,22 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ..draw.contours import Panel, Scale, common_extent, common_scale, draw_panel, panel_of
-from ..draw.style import COLOURS, new_figure, style, with_unit
+from ..draw.contours import Panel, Scale, common_extent, common_scale, panel_of
+from ..draw.layout import TALLEST, Wishes, shared
+from ..draw.panels import Cell, Rows, panel_figure
+from ..draw.style import COLOURS, style
 from ..measure.smooth import WORDS, smoothed_for
 from ..read.errors import PostError, RequestError
-from ..read.fields import label_of
 from ..read.points import FloatArray
 from ..read.run import Frame
 from . import drawing as draw
 from .drawing import COMMON, Row
-from .layout import Layout, Place, arranged, shared
 from .measures import band_at
 from .types import Column, Drawing, State, StudyRun
 
@@ -27,8 +28,6 @@ CONTOUR_OPTIONS = COMMON | {
     "by", "field", "strain", "rows", "same_scale", "low", "high", "deformed", "per_row",
     "show_line", "smooth", "panel_height",
 }  # fmt: skip
-
-LONGEST_BAR = 70.0  # [mm]
 
 
 @dataclass(frozen=True)
@@ -85,7 +84,7 @@ def _rows(runs: Sequence[StudyRun], options: Mapping[str, Any], field: str) -> l
         for run in runs:
             titles = [f"ε = {100.0 * s:g} %" if run is runs[0] else "" for s in strains]
             cells = [_cell(run, s, t, options, field) for s, t in zip(strains, titles)]
-            heading = draw.shown(draw.value_of(run, by)) if by else run.label
+            heading = draw.named(run, by) if by else run.label
             found.append(_Row(heading if len(runs) > 1 else "", cells))
         return found
     strain = strains[0] if strains else None
@@ -113,7 +112,7 @@ def _cell(
         frame = run.run.frame(wanted)
         if draw.flag(options, "smooth"):
             frame = smoothed_for(frame, field, deformed)
-        panel = panel_of(frame, field, deformed, title=title)
+        panel = panel_of(frame, field, deformed)
     except PostError as error:
         return _Cell(run, title, None, None, str(error))
     return _Cell(run, title, frame, panel)
@@ -123,42 +122,22 @@ def _contour_figure(
     rows: list[_Row], scale: Scale, field: str, options: Mapping[str, Any]
 ) -> Figure:
     extents = _extents(rows)
-    layout = arranged(
-        extents,
-        [[cell.title for cell in row.cells] for row in rows],
+    line = draw.flag(options, "show_line")
+    cells = [
+        [
+            Cell(cell.title, extent, cell.panel, partial(_draw_line, cell) if line else None)
+            for cell, extent in zip(row.cells, in_row)
+        ]
+        for row, in_row in zip(rows, extents)
+    ]
+    wishes = Wishes(
         draw.width_of(options, "double"),
         draw.flag(options, "same_scale", True),
-        draw.number(options, "panel_height"),
-        any(row.heading for row in rows),
+        draw.number(options, "panel_height") or TALLEST,
     )
-    figure = new_figure(layout.width, layout.height, layout=None)
-    drawn: Any = None
-    for i, row in enumerate(rows):
-        below = len(rows[i + 1].cells) if i + 1 < len(rows) else 0
-        for j, (cell, place) in enumerate(zip(row.cells, layout.rows[i])):
-            ax = figure.add_axes(_box(layout, place.x, place.y, place.width, place.height))
-            drawn = _draw_cell(ax, cell, extents[i][j], scale, options) or drawn
-            _label_axes(ax, place, row.heading, j == 0, j >= below)
-    top = min(place.y - place.height for place in layout.rows[0])
-    low = max(place.y for place in layout.rows[-1])
-    tall = min(low - top, LONGEST_BAR)
-    bar_axes = figure.add_axes(
-        _box(layout, layout.right + 3.0, 0.5 * (top + low + tall), 2.8, tall)
-    )
-    bar: Any = figure.colorbar(drawn, cax=bar_axes, extend=scale.extend)
-    name = with_unit(label_of(field), scale.unit)
-    smooth = draw.flag(options, "smooth")
-    bar.set_label(f"{name}; displacements {WORDS}" if smooth else name)
-    bar.outline.set_linewidth(0.5)
-    return figure
-
-
-def _box(
-    layout: Layout, x: float, y: float, width: float, height: float
-) -> tuple[float, float, float, float]:
-    """Axes by their lower left corner from the upper left of the figure, and size [mm]."""
-    wide, high = layout.width, layout.height
-    return (x / wide, 1.0 - y / high, width / wide, height / high)
+    more = f"; displacements {WORDS}" if draw.flag(options, "smooth") else ""
+    headings = [row.heading for row in rows]
+    return panel_figure(Rows(cells, headings), wishes, scale, field, more)[0]
 
 
 def _extents(rows: list[_Row]) -> list[list[FloatArray]]:
@@ -169,21 +148,7 @@ def _extents(rows: list[_Row]) -> list[list[FloatArray]]:
     return [[next(all_extents) for _ in row.cells] for row in rows]
 
 
-def _draw_cell(ax: Axes, cell: _Cell, extent: Any, scale: Scale, options: Mapping[str, Any]) -> Any:
-    drawn = None
-    if cell.panel is not None:
-        drawn = draw_panel(ax, cell.panel, scale)
-        if draw.flag(options, "show_line"):
-            _draw_line(ax, cell)
-    else:
-        ax.text(0.5, 0.5, "no result", transform=ax.transAxes, ha="center", va="center",
-                fontsize=7, rotation=90, color="0.4")  # fmt: skip
-    ax.set(xlim=(extent[0], extent[2]), ylim=(extent[1], extent[3]))
-    ax.set_aspect("auto")  # the axes have the shape of the extent already
-    return drawn
-
-
-def _draw_line(ax: Axes, cell: _Cell) -> None:
+def _draw_line(cell: _Cell, ax: Axes) -> None:
     assert cell.frame is not None
     try:
         found, _ = band_at(cell.run.run, State(cell.frame.strain, cell.run.state.line))
@@ -191,17 +156,6 @@ def _draw_line(ax: Axes, cell: _Cell) -> None:
         return
     x, y = zip(*found.profile.line)
     ax.plot(x, y, color=COLOURS[1], linewidth=0.9)
-
-
-def _label_axes(ax: Axes, place: Place, heading: str, first: bool, lowest: bool) -> None:
-    ax.set_title(place.title, fontsize=7, pad=2.5, linespacing=1.1)
-    ax.tick_params(labelsize=6, pad=1.5, labelleft=place.numbered)
-    ax.locator_params(axis="x", nbins=2 if place.width < 16.0 else 4)
-    ax.locator_params(axis="y", nbins=3 if place.height < 20.0 else 5)
-    if first:
-        ax.set_ylabel(f"{heading}\ny [m]" if heading else "y [m]", fontsize=7, labelpad=1.5)
-    if lowest:
-        ax.set_xlabel("x [m]", fontsize=7, labelpad=1.5)
 
 
 def _contour_row(cell: _Cell, field: str) -> Row:

@@ -10,12 +10,14 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ..draw.style import new_figure, style, with_unit
+from ..draw.legends import LegendPlace, legend
+from ..draw.style import new_figure, readable, style, with_unit
+from ..draw.text import fit_numbers
 from ..measure.curves import Curve, history_curve, stress_strain
 from ..measure.quality import START, kinetic_bound, kinetic_curve, reaction_gap
 from ..read.errors import PostError, RequestError
 from . import drawing as draw
-from .drawing import AXES, COMMON, LegendPlace, Look, Row
+from .drawing import AXES, COMMON, Look, Row
 from .types import Column, Drawing, StudyRun
 
 CURVE_OPTIONS = COMMON | AXES | {
@@ -55,7 +57,8 @@ def curves(
         draw.set_ranges(ax, options)
         draw.finish(ax)
         _inset(ax, styled, options, factor)
-        draw.legend(ax, place, draw.text(options, "legend_title"))
+        legend(ax, place, draw.text(options, "legend_title"))
+        fit_numbers(ax)
     rows = [row for s in styled for row in _curve_rows(s)]
     return Drawing(figure, rows)
 
@@ -85,7 +88,8 @@ def history(
         ax.set_ylabel(draw.axis_text(name, unit, draw.text(options, "y_label")))
         draw.set_ranges(ax, options)
         draw.finish(ax)
-        draw.legend(ax, place, draw.text(options, "legend_title"))
+        legend(ax, place, draw.text(options, "legend_title"))
+        fit_numbers(ax)
     return Drawing(figure, [row for s in styled for row in _curve_rows(s)])
 
 
@@ -99,7 +103,7 @@ def _styled(
     by = draw.text(options, "by")
     if by:
         draw.require_known(runs, by, columns)
-    groups = draw.grouped(runs, by) if by else {}
+    groups = draw.grouped(runs, by, not draw.text(options, "legend_title")) if by else {}
     group_of = {run.id: name for name, members in groups.items() for run in members}
     found: list[_Styled] = []
     used: dict[str, int] = {}
@@ -150,7 +154,7 @@ def _lines_into(ax: Axes, styled: Sequence[_Styled], factor: float) -> None:
     for s in styled:
         ax.plot(
             s.curve.x * _x_factor(s.curve), s.curve.y * factor, color=s.look.colour,
-            linestyle=s.look.dash, label=s.label,
+            linestyle=s.look.dash, label=None if s.label is None else readable(s.label),
         )  # fmt: skip
 
 
@@ -227,7 +231,8 @@ def quality(
         upper.annotate(
             note, (0.98, 0.96), xycoords="axes fraction", ha="right", va="top", fontsize=6
         )
-        draw.legend(upper, place, draw.text(options, "legend_title"))
+        legend(upper, place, draw.text(options, "legend_title"))
+        fit_numbers(lower)
     return Drawing(figure, rows)
 
 
@@ -249,7 +254,7 @@ def _draw_quality(upper: Axes, lower: Axes, run: StudyRun, look: Look) -> list[R
         parts.append((name, x, y))
     if parts:  # a sample for the legend: both the points and the lines
         upper.plot([], [], color=look.colour, marker=look.marker, ms=3.0, linestyle=look.dash,
-                   label=run.label)  # fmt: skip
+                   label=readable(run.label))  # fmt: skip
     words = {"exact": "kinetic_ratio", "bound": "kinetic_bound", "gap": "reaction_gap"}
     return [
         {"series": run.series, "run": run.id, "label": run.label, "quantity": words[name],

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from matplotlib.axes import Axes
-from matplotlib.legend import Legend
-from matplotlib.lines import Line2D
 
+from ..draw.legends import LegendPlace, best_place, placed
 from ..draw.style import COLOURS, DASHES, DOUBLE, SINGLE, prefix_for, with_unit
 from ..read.errors import RequestError
 from .types import Column, StudyRun, Value
@@ -17,12 +16,7 @@ from .types import Column, StudyRun, Value
 MARKERS = ["o", "s", "^", "D", "v", "P", "X"]
 COMMON = frozenset({"only", "column", "height"})  # options of every kind of figure
 AXES = frozenset({"x_label", "y_label", "x_log", "y_log", "x_range", "y_range", "scale"})
-NO_LEGEND_OVER = 16  # entries in one column of a legend
-ASIDE_FROM = 9  # entries from which the legend stands beside the axes
-COMPARED = 1.0  # order of drawing of lines that others are compared with: below these
 LEAST_RANGE = 0.04  # of the largest value: a y axis shows at least this much
-_LETTER = 1.2  # mean width of a letter of a legend [mm]
-_HANDLE = 10.0  # and of the sample of a line
 
 Row = dict[str, Value]
 
@@ -194,27 +188,40 @@ def shown(value: Value) -> str:
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
-def grouped(runs: Sequence[StudyRun], by: str) -> dict[str, list[StudyRun]]:
+def grouped(
+    runs: Sequence[StudyRun], by: str, with_name: bool = False
+) -> dict[str, list[StudyRun]]:
     """Runs by the value of a parameter or column, in order of appearance; series by their titles.
+
+    `with_name`: numbers stand behind the name of their parameter, where no title tells it.
 
     Two series with the same title would be one: they keep their names.
     """
     groups: dict[str, list[StudyRun]] = {}
     for run in runs:
-        groups.setdefault(shown(value_of(run, by)), []).append(run)
+        groups.setdefault(named(run, by) if with_name else shown(value_of(run, by)), []).append(run)
     titles = [members[0].series_title or name for name, members in groups.items()]
     if by == "series" and len(set(titles)) == len(groups):
         return dict(zip(titles, groups.values()))
     return groups
 
 
+def named(run: StudyRun, by: str) -> str:
+    """A value with the name of its parameter, unless it is a word."""
+    value = value_of(run, by)
+    if value is None or isinstance(value, str):
+        return shown(value)
+    return f"{by.replace('_', ' ')} = {shown(value)}"
+
+
 # ---- axes ----------------------------------------------------------------------------------
 
 
 def words(name: str) -> str:
-    """Text for a quantity, without unit."""
+    """Text for a quantity, without unit; a symbol stays as it is: p is not P."""
     plain = name.replace("_", " ")
-    return _WORDS.get(name, plain[:1].upper() + plain[1:])
+    symbol = len(plain) <= 2 or plain != plain.lower()
+    return _WORDS.get(name, plain if symbol else plain[:1].upper() + plain[1:])
 
 
 def display_unit(unit: str, wanted: str, largest: float) -> tuple[float, str]:
@@ -262,15 +269,6 @@ def finish(ax: Axes) -> None:
     ax.set_axisbelow(True)
 
 
-@dataclass(frozen=True)
-class LegendPlace:
-    """Where the legend stands, and what that means for the size of the figure."""
-
-    where: str  # "inside" | "above" | "aside" | "none"
-    width: float  # of the figure [mm]
-    extra: float  # height that it needs above the axes [mm]
-
-
 def legend_place(
     options: Mapping[str, Any], labels: Sequence[str], most_inside: int, wanted: bool = True
 ) -> LegendPlace:
@@ -283,49 +281,11 @@ def legend_place(
     places = ("inside", "above", "aside")
     if not isinstance(given, bool) and given not in places:
         raise RequestError(f"the option legend must be true, false, {' or '.join(places)}")
-    longest = max((len(label) for label in labels), default=0)
     if given is False:
         where = "none"
     elif isinstance(given, str):
         where = given
-    elif len(labels) <= most_inside:
-        where = "inside"
     else:
-        narrow = 2.0 * (_LETTER * longest + _HANDLE) <= SINGLE - 6.0
-        where = "above" if narrow and len(labels) < ASIDE_FROM else "aside"
+        where = best_place(labels, most_inside)
     width = width_of(options, "double" if where == "aside" else "single")
-    rows = -(-len(labels) // 2) + bool(options.get("legend_title"))
-    return LegendPlace(where, width, 3.8 * rows if where == "above" else 0.0)
-
-
-def legend(ax: Axes, place: LegendPlace, title: str = "") -> None:
-    """Draw the legend; lines to compare with stand last."""
-    handles, labels = ax.get_legend_handles_labels()
-    if place.where == "none" or not handles:
-        return
-    compared = [isinstance(h, Line2D) and h.get_zorder() <= COMPARED for h in handles]
-    order = sorted(range(len(handles)), key=compared.__getitem__)
-    common: dict[str, Any] = {
-        "handles": [handles[k] for k in order], "labels": [labels[k] for k in order],
-        "title": title or None, "title_fontsize": 7, "handlelength": 2.4,
-    }  # fmt: skip
-    above: dict[str, Any] = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0), "ncols": 2}
-    if place.where == "aside":
-        columns = 2 if len(labels) > NO_LEGEND_OVER else 1
-        ax.legend(
-            loc="upper left", bbox_to_anchor=(1.01, 1.02), borderaxespad=0.0,
-            ncols=columns, **common,
-        )  # fmt: skip
-        return
-    drawn = ax.legend(**(above if place.where == "above" else {"loc": "best"}), **common)
-    if place.where == "inside" and _covers(ax, drawn):
-        ax.legend(**above, **common)
-
-
-def _covers(ax: Axes, drawn: Legend) -> bool:
-    """Whether a legend lies on a line, as it does where there is no room in the axes."""
-    figure: Any = ax.figure
-    figure.draw_without_rendering()
-    box = drawn.get_window_extent()
-    paths: list[Any] = [line.get_path().transformed(line.get_transform()) for line in ax.lines]
-    return any(len(p.vertices) and p.intersects_bbox(box, filled=False) for p in paths)
+    return placed(labels, where, width, text(options, "legend_title"))

@@ -10,7 +10,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, NullLocator
 
-from ..draw.style import new_figure, style
+from ..draw.legends import COMPARED, legend
+from ..draw.style import new_figure, readable, style
+from ..draw.text import fit_numbers
 from ..read.errors import RequestError
 from . import drawing as draw
 from .drawing import AXES, COMMON, Look, Row
@@ -85,7 +87,8 @@ def plot(
         draw.set_ranges(ax, options)
         _x_ticks(ax, lines, names, x_factor, options)
         draw.finish(ax)
-        draw.legend(ax, place, draw.text(options, "legend_title"))
+        legend(ax, place, draw.text(options, "legend_title"))
+        fit_numbers(ax)
     return Drawing(figure, [row for line in lines for row in _point_rows(line, x, names)])
 
 
@@ -141,7 +144,7 @@ def _lines(
     given = draw.texts(options, "names")
     if given and len(given) != len(ys):
         raise RequestError(f"{len(given)} names are given for {len(ys)} columns")
-    groups = draw.grouped(runs, by)
+    groups = draw.grouped(runs, by, not draw.text(options, "legend_title"))
     found = []
     for i, (group, members) in enumerate(groups.items()):
         for j, y in enumerate(ys):
@@ -194,7 +197,7 @@ def _draw_points(
         yerr=np.nan_to_num(error) if bars else None,
         color=line.look.colour, marker=line.look.marker,
         linestyle=line.look.dash if connected else "none",
-        capsize=2.0, elinewidth=0.7, capthick=0.7, label=line.label,
+        capsize=2.0, elinewidth=0.7, capthick=0.7, label=readable(line.label),
     )  # fmt: skip
 
 
@@ -219,7 +222,7 @@ def _extra_lines(
     if target is not None:
         ax.axhline(
             float(target) * factor, color="black", linewidth=0.8, linestyle=(0, (4, 2)),
-            label=draw.text(options, "target_label") or None, zorder=draw.COMPARED,
+            label=readable(draw.text(options, "target_label")) or None, zorder=COMPARED,
         )  # fmt: skip
     slope = options.get("slope")
     if isinstance(slope, str):
@@ -231,7 +234,7 @@ def _extra_lines(
         x = np.linspace(0.0, 1.05 * top, 2 if not draw.flag(options, "x_log") else 50)
         ax.plot(
             x * x_factor, slope * x * factor, color="black", linewidth=0.8, linestyle=":",
-            label=draw.text(options, "slope_label") or None, zorder=draw.COMPARED,
+            label=readable(draw.text(options, "slope_label")) or None, zorder=COMPARED,
         )  # fmt: skip
 
 

@@ -9,7 +9,9 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 
-from ..draw.style import new_figure, style, with_unit
+from ..draw.legends import legend
+from ..draw.style import new_figure, readable, style, with_unit
+from ..draw.text import fit_numbers
 from ..measure.band import LEVEL, BandMeasure, Line
 from ..measure.measures import frame_profile
 from ..read.errors import PostError, RequestError
@@ -82,7 +84,8 @@ def profiles(
             ax.set_xlim(0.0, max(float(c.found.profile.distance[-1]) for c in there))
         draw.set_ranges(ax, options)
         draw.finish(ax)
-        draw.legend(ax, place, title)
+        legend(ax, place, title)
+        fit_numbers(ax)
     return Drawing(figure, [row for curve in there for row in _profile_rows(curve, field)])
 
 
@@ -130,7 +133,7 @@ def _draw_profile(
         factor = 1.0 / (width.peak if plastic else float(np.nanmax(np.abs(curve.values))))
     ax.plot(
         profile.distance - start, curve.values * factor, color=look.colour, linestyle=look.dash,
-        label=label,
+        label=readable(label),
     )  # fmt: skip
     if plastic:
         target = width.level * width.peak * factor
