@@ -6,6 +6,7 @@ module pd_run
   use pd_checkpoint, only: checkpoint_t
   use pd_clock, only: clock_t
   use pd_command_line, only: options_t
+  use pd_doubt_list, only: doubts_t
   use pd_errors, only: error_list_t, exit_file, exit_input, exit_model, outcome_t
   use pd_history_columns, only: history_columns
   use pd_increment, only: begin_increments, increments_t, new_increments
@@ -15,8 +16,10 @@ module pd_run
   use pd_ledger, only: ledger_t, new_ledger
   use pd_model, only: model_t, release_set_up, start
   use pd_observe, only: column_t, moment_at, observation_t, observe
-  use pd_record, only: load_checkpoint, observe_state, open_record, record_frame, record_line, &
-    record_progress, record_row, record_t, results_in_the_way, same_history, same_points
+  use pd_plausibility, only: look_at_model, look_at_motion
+  use pd_record, only: largest_reaction_before, load_checkpoint, load_doubts, observe_state, &
+    open_record, record_doubts, record_frame, record_line, record_progress, record_row, record_t, &
+    results_in_the_way, same_history, same_points
   use pd_reversal, only: new_reversal, reversal_t
   use pd_run_description, only: provenance_t
   use pd_schedule, only: schedule_t
@@ -52,13 +55,9 @@ module pd_run
     type(record_t)     :: record
     type(timing_t)     :: timing
     type(checkpoint_t) :: checkpoint          !! to continue from; no rows: a new run
-    type(error_list_t) :: warnings
-    logical :: doubted = .false.              !! the energy balance has been warned of
+    type(doubts_t)     :: doubts
     logical :: jump_told = .false.            !! at equilibrium
-    logical :: balance_doubted = .false.      !! that of the forces, too
-    logical :: control_doubted = .false.      !! the part of the control in the work, too
-    logical :: step_doubted = .false.         !! the time step that the user has fixed, too
-    logical :: flow_doubted = .false.         !! flow that turns back, too
+    real(wp) :: largest_reaction = 0.0_wp     !! of a platen so far [N/m]
     integer(int64) :: last_checkpoint = 0     !! count of the system clock
     integer(int64) :: loop_start = 0          !! count of the system clock
   end type run_t
@@ -96,7 +95,7 @@ contains
     call outcome%end_if_any(errors, exit_model)
     if (outcome%done) return
     call keep_standing_load(run, run%stages(run%checkpoint%clock%stage), run%model)
-    call look_at_model(run)
+    call look_at_model(run%input, run%model, run%doubts)
     if (run%checkpoint%history_rows > 0) then
       if (.not. same_history(run%state, run%model)) &
         call errors%add('the laws remember something else than in the checkpoint', run%input%path, &
@@ -109,6 +108,8 @@ contains
     call set_up_schedule(run%input, run%clock, run%model, run%schedule, errors)
     if (run%checkpoint%history_rows == 0) &
       run%limit = new_step_limit(run%model%highest_frequency, run%clock%time_step)
+    if (errors%count() == 0) &
+      call look_at_motion(run%input, run%stages, run%clock, run%schedule, run%model, run%doubts)
     call outcome%end_if_any(errors, exit_input)
     if (outcome%done .or. options%check) return
     if (run%model%at_equilibrium) then
@@ -126,14 +127,14 @@ contains
     call set_up_whole(run%input, run%stages, run%model%whole, input_errors, errors)
     if (errors%count() + input_errors%count() > 0) return
     call set_up_stage_body(run%input, run%stages(run%checkpoint%clock%stage), run%model%whole, &
-      run%model%body, run%warnings, input_errors, errors)
+      run%model%body, run%doubts, input_errors, errors)
   end subroutine set_up_bodies
 
   !> Set up the models of all stages before the first one runs.
   subroutine try_later_stages(run, errors)
     type(run_t),        intent(in)    :: run
     type(error_list_t), intent(inout) :: errors
-    type(error_list_t) :: unheard
+    type(doubts_t) :: unheard
     type(model_t) :: model, empty
     integer :: k
 
@@ -181,13 +182,14 @@ contains
     type(run_t),   intent(in)    :: run
     type(stage_t), intent(in)    :: stage   !! of the model
     type(model_t), intent(inout) :: model
+    type(doubts_t) :: doubts
     type(error_list_t) :: unheard
     type(model_t) :: first
     integer :: k
 
     if (.not. stage%start_time > 0.0_wp .or. .not. is_set(run%input%initial_stress%k0)) return
     first%whole = model%whole
-    call set_up_stage_body(run%input, run%stages(1), first%whole, first%body, unheard, unheard, &
+    call set_up_stage_body(run%input, run%stages(1), first%whole, first%body, doubts, unheard, &
       unheard)
     call set_up_model(run%input, first, unheard, run%stages(1))
     do k = 1, size(first%loads%items)
@@ -199,68 +201,6 @@ contains
       end select
     end do
   end subroutine keep_standing_load
-
-  !> Warn of what can be set up and is hardly meant.
-  subroutine look_at_model(run)
-    type(run_t), intent(inout) :: run
-    integer :: k
-
-    associate (materials => run%model%materials, path => run%input%path)
-      do k = 1, size(materials%list)
-        if (.not. materials%is_used(k)) call run%warnings%add('no point has the material '''// &
-          materials%list(k)%name//'''; &body material chooses one', path)
-      end do
-    end associate
-    if (is_set(run%input%initial_stress%k0)) call look_at_ground(run)
-    if (.not. allocated(run%model%body%place)) call look_at_cloud(run)
-    do k = 1, size(run%model%loads%items)
-      associate (load => run%model%loads%items(k)%load)
-        if (allocated(load%doubt)) &
-          call run%warnings%add(load%doubt, '&'//load%kind//' name = '//load%name)
-      end associate
-    end do
-  end subroutine look_at_model
-
-  !> Warn of ground under horizontal stress that nothing bears but the load that holds it.
-  subroutine look_at_ground(run)
-    type(run_t), intent(inout) :: run
-    character(5), parameter :: walls(2) = [character(5) :: 'left', 'right']
-    logical :: borne
-    integer :: j, k
-
-    if (.not. run%input%initial_stress%k0 > 0.0_wp) return
-    do k = 1, size(walls)
-      borne = .false.
-      do j = 1, size(run%input%boundaries)
-        borne = borne .or. run%input%boundaries(j)%side == walls(k) &
-          .or. run%input%boundaries(j)%side == 'all'
-      end do
-      if (.not. borne) call run%warnings%add('the '//trim(walls(k))//' side has no boundary: '// &
-        'its initial stress is held for good as if the ground went on there', '&initial_stress k0')
-    end do
-  end subroutine look_at_ground
-
-  !> Warn of a cloud of points whose weights or zero-energy modes make stresses too small.
-  subroutine look_at_cloud(run)
-    type(run_t), intent(inout) :: run
-    real(wp), parameter :: hardly_any = 1.0e-6_wp
-
-    associate (left => run%model%unbalanced)
-      if (left(2) > hardly_any) call run%warnings%add('no weights were found with which a '// &
-        'homogeneous stress is in equilibrium inside the cloud: stresses near points of uneven '// &
-        'families come out wrong', '&body file')
-      if (run%input%stabilisation%method /= 'none') return
-      if (left(1) > hardly_any .and. (left(2) < 0.0_wp .or. left(2) > hardly_any)) then
-        call run%warnings%add('points off a lattice without control: a homogeneous stress is '// &
-          'not in equilibrium inside them, and stresses come out much too small; balanced '// &
-          'weights and a control of zero-energy modes help', '&stabilisation method')
-      else
-        call run%warnings%add('points off a lattice without control: where they flow, '// &
-          'zero-energy modes carry a part of the displacement, and loads come out some per '// &
-          'cent too small; a control helps', '&stabilisation method')
-      end if
-    end associate
-  end subroutine look_at_cloud
 
   !> Results of an earlier run are overwritten or continued only on request; a checkpoint is read
   !> if the run continues from it.
@@ -278,7 +218,8 @@ contains
       call outcome%end_if_any(errors, exit_file)
       call outcome%end_if_any(input_errors, exit_input)
       if (outcome%done) return
-      if (warning /= '') call run%warnings%add(warning)
+      if (warning /= '') call run%doubts%add('older_checkpoint', 0.0_wp, warning)
+      call load_doubts(stem, run%checkpoint, run%doubts)
     else if (.not. options%force) then
       if (results_in_the_way(stem)) call errors%add('there are results of an earlier run; '// &
         '--force overwrites them, --restart goes on from a checkpoint, --output DIR writes '// &
@@ -342,9 +283,12 @@ contains
       do i = 1, size(summary%lines)
         call record_line(record, trim(summary%lines(i)), errors)
       end do
-      do i = 1, run%warnings%count()
-        call record_line(record, 'warning: '//run%warnings%message(i), errors)
+      do i = 1, run%doubts%count()
+        call record_line(record, 'warning: '//run%doubts%message(i), errors)
       end do
+      call record_doubts(record, run%doubts, errors)
+      if (run%checkpoint%history_rows > 0) call largest_reaction_before(record, run%model, &
+        run%checkpoint%history_rows, run%largest_reaction)
       call observe_state(run%model, run%state, run%ledger, run%clock, record)
       if (run%checkpoint%history_rows == 0) then
         call record_row(record, errors)

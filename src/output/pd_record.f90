@@ -5,6 +5,7 @@ module pd_record
   use pd_checkpoint, only: checkpoint_exists, checkpoint_t, read_checkpoint, remove_checkpoints, &
     write_checkpoint
   use pd_clock, only: clock_t
+  use pd_doubt_list, only: doubts_t
   use pd_errors, only: error_list_t
   use pd_files, only: prepare_folder
   use pd_frame_fields, only: frame_fields
@@ -25,11 +26,13 @@ module pd_record
   use pd_state, only: state_t
   use pd_step_limit, only: step_limit_t
   use pd_tries, only: tries_t
+  use pd_trust, only: largest_of_column, quality_t, read_doubts, write_doubts, write_quality
   implicit none
   private
 
   public :: record_t, results_in_the_way, open_record, close_record, record_row, record_frame
   public :: record_failure, record_progress, record_line, observe_state
+  public :: record_doubts, record_quality, load_doubts, largest_reaction_before
   public :: record_tries, save_checkpoint, load_checkpoint, same_points, same_history
 
   !> The open outputs of a run.
@@ -260,6 +263,52 @@ contains
 
     call say(record%progress, text, errors)
   end subroutine record_line
+
+  !> Write the doubts of the run into the result file.
+  subroutine record_doubts(record, doubts, errors)
+    type(record_t),     intent(in)    :: record
+    type(doubts_t),     intent(in)    :: doubts
+    type(error_list_t), intent(inout) :: errors
+
+    call write_doubts(record%result%path, doubts, errors)
+  end subroutine record_doubts
+
+  !> Write the quality at the end of the run into the result file.
+  subroutine record_quality(record, quality, errors)
+    type(record_t),     intent(in)    :: record
+    type(quality_t),    intent(in)    :: quality
+    type(error_list_t), intent(inout) :: errors
+
+    call write_quality(record%result%path, quality, errors)
+  end subroutine record_quality
+
+  !> The doubts that were told during the run before a checkpoint.
+  subroutine load_doubts(stem, checkpoint, doubts)
+    character(*),       intent(in)    :: stem
+    type(checkpoint_t), intent(in)    :: checkpoint
+    type(doubts_t),     intent(inout) :: doubts
+
+    call read_doubts(stem//'.h5', checkpoint%clock%step, doubts)
+  end subroutine load_doubts
+
+  !> Largest normal force of a platen in the first rows of the history [N/m]; 0 without platens.
+  subroutine largest_reaction_before(record, model, rows, largest)
+    type(record_t), intent(in)  :: record
+    type(model_t),  intent(in)  :: model
+    integer,        intent(in)  :: rows
+    real(wp),       intent(out) :: largest
+    character(1), parameter :: axes(2) = ['x', 'y']
+
+    largest = 0.0_wp
+    associate (p => model%platens, items => model%supports%items)
+      if (p%axis == 0) return
+      largest = max( &
+        largest_of_column(record%result%path, rows, items(p%first)%support%name//'_force_'// &
+        axes(p%axis)), &
+        largest_of_column(record%result%path, rows, items(p%second)%support%name//'_force_'// &
+        axes(p%axis)))
+    end associate
+  end subroutine largest_reaction_before
 
   !> Write a checkpoint of the state after a step, but first the rows of the history before it.
   subroutine save_checkpoint(model, state, ledger, clock, limit, record, errors)
