@@ -144,23 +144,25 @@ contains
     real(wp), parameter :: failed = 0.1_wp
     integer,  parameter :: first_steps = 20
     real(wp) :: lacking
-    logical  :: first
+    logical  :: first, early
 
     first = run%clock%step <= first_steps .and. .not. run%schedule%is_over(run%clock) &
       .and. .not. run%model%at_equilibrium
     if (first .and. run%clock%step == 1) return
     lacking = imbalance(run%record%seen, run%ledger)
+    early = run%model%at_equilibrium .and. &
+      run%clock%time() < at_first * run%schedule%end_time   ! there is hardly any work yet
     if (first .and. lacking <= 1.0_wp) return
     if (.not. abs(lacking) <= failed .and. .not. run%model%at_equilibrium) then
       call fail('the energy balance is off by '//short_number(100.0_wp * lacking)// &
         ' % of the work, at most 10 %', fastest_row(run), run, outcome)
-    else if (is_new('energy_balance', abs(lacking), run)) then
+    else if (is_new('energy_balance', abs(lacking), run) .and. .not. early) then
       call tell('energy_balance', abs(lacking), 'the energy balance is off by '// &
         short_number(100.0_wp * lacking)//' % of the work at step '// &
         integer_text(run%clock%step)//'; above 1 % '//remedy(run)//' is due', run, errors)
     end if
     if (outcome%done) return
-    call look_at_control(run, errors)
+    if (.not. early) call look_at_control(run, errors)
     call look_at_equilibrium(run, errors)
   end subroutine look_at_balance
 

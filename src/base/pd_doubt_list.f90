@@ -4,6 +4,7 @@
 !> Each is told on the screen and in the log, and stands in the result file; `perigeo --doubts`
 !> prints the table, which doc/doubts.md shows.
 module pd_doubt_list
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
   use pd_errors, only: error_list_t
   use pd_kinds, only: wp
   use pd_text, only: short_number
@@ -60,11 +61,12 @@ module pd_doubt_list
     'outermost points', upper=1.5_wp), &
     doubt_kind_t('older_checkpoint', 'start', 'a restart from the checkpoint before the newest'), &
     doubt_kind_t('energy_balance', 'run', 'what the balance of energies lacks over the work, '// &
-    'in magnitude', upper=0.01_wp), &
-    doubt_kind_t('control_work', 'run', 'energy of the zero-energy control over the work', &
+    'in magnitude; at equilibrium after the first fifth of the run', upper=0.01_wp), &
+    doubt_kind_t('control_work', 'run', 'energy of the zero-energy control over the work; at '// &
+    'equilibrium after the first fifth of the run', &
     upper=0.01_wp), &
     doubt_kind_t('zero_energy', 'run', 'zero-energy part of the deformation over the strain, '// &
-    'rms of both at the points in whose family nothing has flowed, at frames', upper=2.0_wp), &
+    'rms of both at the points in whose family nothing has flowed, at frames', upper=3.0_wp), &
     doubt_kind_t('damping_share', 'run', 'forces of the damping over reactions and loads, '// &
     'after the first fifth of the run', upper=0.05_wp), &
     doubt_kind_t('kinetic_ratio', 'run', 'kinetic over internal energy of a damped motion, '// &
@@ -141,6 +143,8 @@ contains
 
     integer :: k
 
+    is_doubtful = .false.
+    if (ieee_is_nan(value)) return
     k = kind_number(name)
     is_doubtful = value < doubt_kinds(k)%lower .or. value > doubt_kinds(k)%upper
   end function is_doubtful

@@ -5,6 +5,7 @@
 !> measure.
 !> Source: doc/theory.md, sections 5 and 10.
 module pd_zero_energy
+  use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   use pd_kinds, only: n_block, wp
   use pd_model, only: model_t
   use pd_state, only: state_t
@@ -16,8 +17,8 @@ module pd_zero_energy
 contains
 
   !> Root of sum V z^2 over sum V |E|^2, over the points of the body in whose family, themselves
-  !> included, nothing has flowed; z is the field `zero_energy`, |E| the norm of the strain. 0 where
-  !> such points are a hundredth of the body or less, or hardly strained.
+  !> included, nothing has flowed; z is the field `zero_energy`, |E| the norm of the strain. Not a
+  !> number where such points are a hundredth of the body or less, or hardly strained.
   real(wp) function zero_energy_ratio(model, state) result(ratio)
     type(model_t), intent(in) :: model
     type(state_t), intent(in) :: state
@@ -35,7 +36,7 @@ contains
     do k = 1, size(sums)
       sums(k) = model%blocks%total(parts(k, :))
     end do
-    ratio = 0.0_wp
+    ratio = ieee_value(1.0_wp, ieee_quiet_nan)
     if (sums(2) > tiny_strain**2 * sums(3) .and. sums(3) > enough * sums(4)) &
       ratio = sqrt(sums(1) / sums(2)) / model%delta
   end function zero_energy_ratio

@@ -270,6 +270,59 @@ def test_doubts_go_through_a_restart(program, run_case, tmp_path):
     assert "older_checkpoint" in doubts_of(tmp_path / "out" / "case.h5")
 
 
+def test_a_failure_tells_the_state_at_the_point_and_what_helps(run_case, tmp_path):
+    control, steps = (
+        "a control of zero-energy modes (&stabilisation",
+        "a smaller safety or time step",
+    )
+    for method in ("none", "relaxing"):
+        text = changed(SQUEEZED, time_step="0.0014") + f"&stabilisation method = '{method}' /\n"
+        done = run_case(text, tmp_path, "--quiet", "--force")
+        assert done.returncode == 4
+        log = (tmp_path / "out" / "case.log").read_text()
+        for words in (done.stderr, log):
+            found = re.search(
+                r"there strain is (\S+), (\S+), (\S+) \(xx, yy, xy\), det F (\S+), "
+                r"zero_energy ([\d.E+-]+)[;\n]",
+                words,
+            )
+            xx, yy, _, det_f, zero_energy = (float(x) for x in found.groups())
+            assert det_f == pytest.approx((1 + xx) * (1 + yy), rel=0.01)
+            assert zero_energy >= 0
+        assert (control in done.stderr) == (method == "none")
+        assert steps in done.stderr
+        assert "quality when it was looked at last: energy error" in log
+    with h5py.File(tmp_path / "out" / "case.h5") as file:
+        assert math.isfinite(file["quality"].attrs["energy_error"])
+        assert math.isnan(file["quality"].attrs["zero_energy"])
+
+
+def test_every_run_ends_with_its_quality(run_case, tmp_path):
+    control = "&stabilisation method = 'relaxing' /\n"
+    still = re.sub(r"damping = [^/]*", "method = 'equilibrium' ", SHORT)
+    for text, left_out in (
+        (SHORT, {"control_share"}),
+        (PUSHED + control, set()),
+        (still, {"kinetic_ratio", "damping_share", "control_share"}),
+        (HELD + PRESSED, {"reaction_gap", "control_share"}),
+    ):
+        done = run_case(text, tmp_path, "--quiet", "--force")
+        assert done.returncode == 0, done.stderr
+        log = (tmp_path / "out" / "case.log").read_text()
+        assert re.search(r"^quality at the end: .*smallest det F 0\.9", log, re.MULTILINE)
+        with h5py.File(tmp_path / "out" / "case.h5") as file:
+            quality = dict(file["quality"].attrs)
+            row = {name: file["history"][name][-1] for name in file["history"]}
+        unknown = {name for name, value in quality.items() if math.isnan(value)}
+        assert unknown - {"zero_energy"} == left_out
+        assert quality["min_det_f"] == row["min_det_f"]
+        if "kinetic_ratio" not in left_out:
+            internal = row["strain_energy"] + row["plastic_dissipation"]
+            assert quality["kinetic_ratio"] == pytest.approx(row["kinetic_energy"] / internal)
+            assert quality["damping_share"] == row["damping_share"]
+        assert ("zero_energy" in unknown) == (text in (SHORT, still))  # they flow everywhere
+
+
 def test_every_doubt_is_tried_here_and_stands_in_the_documents(perigeo, tmp_path):
     table = perigeo(["--doubts"], tmp_path).stdout
     names = re.findall(r"^\| `(\w+)` \|", table, re.MULTILINE)
