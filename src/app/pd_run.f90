@@ -1,13 +1,13 @@
 !> A run: what it consists of, and how it begins.
 module pd_run
-  use, intrinsic :: iso_fortran_env, only: compiler_version, int64
+  use, intrinsic :: iso_fortran_env, only: compiler_version, int64, output_unit
   use omp_lib, only: omp_get_max_threads
   use pd_body_force, only: body_force_t, new_body_force
   use pd_checkpoint, only: checkpoint_t
   use pd_clock, only: clock_t
   use pd_command_line, only: options_t
   use pd_doubt_list, only: doubts_t
-  use pd_errors, only: error_list_t, exit_file, exit_input, exit_model, outcome_t
+  use pd_errors, only: error_list_t, exit_file, exit_input, exit_model, exit_ok, outcome_t
   use pd_history_columns, only: history_columns
   use pd_increment, only: begin_increments, increments_t, new_increments
   use pd_input, only: read_input
@@ -17,9 +17,9 @@ module pd_run
   use pd_model, only: model_t, release_set_up, start
   use pd_observe, only: column_t, moment_at, observation_t, observe
   use pd_plausibility, only: look_at_model, look_at_motion
-  use pd_record, only: largest_reaction_before, load_checkpoint, load_doubts, observe_state, &
-    open_record, record_doubts, record_frame, record_line, record_progress, record_row, record_t, &
-    results_in_the_way, same_history, same_points
+  use pd_record, only: largest_reaction_before, load_checkpoint, load_doubts, look_for_end, &
+    observe_state, open_record, record_doubts, record_frame, record_line, record_progress, &
+    record_row, record_t, results_in_the_way, same_history, same_points
   use pd_reversal, only: new_reversal, reversal_t
   use pd_run_description, only: provenance_t
   use pd_schedule, only: schedule_t
@@ -210,11 +210,21 @@ contains
     type(outcome_t), intent(inout) :: outcome
     type(error_list_t) :: errors, input_errors
     character(:), allocatable :: stem, warning
+    logical :: complete, same
 
     stem = run%input%run%output_dir//'/'//run%input%run%name
     if (options%restart) then
+      call look_for_end(run%input, complete, same)
+      if (complete .and. same) then
+        if (.not. options%quiet) write (output_unit, '(a)') 'the run is finished: '//stem// &
+          '.h5 is complete; a later end goes on from a checkpoint, --force begins anew'
+        call outcome%end_with(exit_ok)
+        return
+      end if
       call load_checkpoint(run%input, run%checkpoint, run%state, run%ledger, warning, errors, &
         input_errors)
+      if (complete .and. errors%count() > 0) call errors%add('the run is finished, and no '// &
+        'state was kept from which it could go on to a later end; &output checkpoint_every keeps one')
       call outcome%end_if_any(errors, exit_file)
       call outcome%end_if_any(input_errors, exit_input)
       if (outcome%done) return

@@ -12,14 +12,14 @@ module pd_record
   use pd_geometry, only: body_t
   use pd_history, only: close_history, create_history, history_t, resume_history, write_row
   use pd_history_columns, only: history_columns
-  use pd_input, only: compare_used, used_values
+  use pd_input, only: compare_used, same_end, used_values
   use pd_input_types, only: input_t
   use pd_kinds, only: is_set, wp
   use pd_ledger, only: ledger_t
   use pd_model, only: model_t
   use pd_observe, only: column_t, moment_at, moment_t, observation_t, observe
   use pd_progress, only: close_progress, open_progress, progress_t, say, show_progress, status_t
-  use pd_result, only: add_row, create_result, finish_result, places_t, result_exists, result_t, &
+  use pd_result, only: add_row, create_result, finish_result, places_t, read_end, result_exists, result_t, &
     resume_result, write_failed_frame, write_frame, write_rows, write_tries
   use pd_run_description, only: provenance_t, run_description_t
   use pd_schedule, only: schedule_t
@@ -30,7 +30,7 @@ module pd_record
   implicit none
   private
 
-  public :: record_t, results_in_the_way, open_record, close_record, record_row, record_frame
+  public :: record_t, results_in_the_way, look_for_end, open_record, close_record, record_row, record_frame
   public :: record_failure, record_progress, record_line, observe_state
   public :: record_doubts, record_quality, load_doubts, largest_reaction_before
   public :: record_tries, save_checkpoint, load_checkpoint, same_points, same_history
@@ -60,6 +60,22 @@ contains
     results_in_the_way = result_exists(stem)
     if (.not. results_in_the_way) results_in_the_way = checkpoint_exists(stem)
   end function results_in_the_way
+
+  !> Whether the result of a run is complete, and whether that is all that the input asks for: the
+  !> same run to the same end.
+  subroutine look_for_end(input, complete, same)
+    type(input_t), intent(in)  :: input
+    logical,       intent(out) :: complete, same
+    type(error_list_t) :: different
+    type(run_description_t) :: old, new
+
+    call read_end(input%run%output_dir//'/'//input%run%name//'.h5', complete, old%values)
+    same = .false.
+    if (.not. complete) return
+    new%values = used_values(input)
+    call compare_used(old%values, new%values, different)
+    same = different%count() == 0 .and. same_end(old%values, new%values)
+  end subroutine look_for_end
 
   !> Open all outputs: new ones, or those of a checkpoint (with rows in the history).
   !>
