@@ -224,7 +224,7 @@ contains
       call load_checkpoint(run%input, run%checkpoint, run%state, run%ledger, warning, errors, &
         input_errors)
       if (complete .and. errors%count() > 0) call errors%add('the run is finished, and no '// &
-        'state was kept from which it could go on to a later end; &output checkpoint_every keeps one')
+        'state was kept from which it could go on; &output checkpoint_every keeps one')
       call outcome%end_if_any(errors, exit_file)
       call outcome%end_if_any(input_errors, exit_input)
       if (outcome%done) return

@@ -19,8 +19,8 @@ module pd_record
   use pd_model, only: model_t
   use pd_observe, only: column_t, moment_at, moment_t, observation_t, observe
   use pd_progress, only: close_progress, open_progress, progress_t, say, show_progress, status_t
-  use pd_result, only: add_row, create_result, finish_result, places_t, read_end, result_exists, result_t, &
-    resume_result, write_failed_frame, write_frame, write_rows, write_tries
+  use pd_result, only: add_row, create_result, finish_result, places_t, read_end, result_exists, &
+    result_t, resume_result, write_failed_frame, write_frame, write_rows, write_tries
   use pd_run_description, only: provenance_t, run_description_t
   use pd_schedule, only: schedule_t
   use pd_state, only: state_t
@@ -30,7 +30,8 @@ module pd_record
   implicit none
   private
 
-  public :: record_t, results_in_the_way, look_for_end, open_record, close_record, record_row, record_frame
+  public :: record_t, results_in_the_way, look_for_end
+  public :: open_record, close_record, record_row, record_frame
   public :: record_failure, record_progress, record_line, observe_state
   public :: record_doubts, record_quality, load_doubts, largest_reaction_before
   public :: record_tries, save_checkpoint, load_checkpoint, same_points, same_history
