@@ -5,6 +5,7 @@
 module pd_plausibility
   use pd_clock, only: clock_t
   use pd_doubt_list, only: doubt_kinds, doubts_t, is_doubtful, kind_number
+  use pd_errors, only: error_list_t
   use pd_families, only: horizon_t, influence, new_horizon
   use pd_input_types, only: boundary_input_t, input_t, material_input_t
   use pd_kinds, only: is_set, pi, wp
@@ -196,13 +197,16 @@ contains
 
   !> Warn of an end, of steps and of velocities that are out of proportion, and of a time step
   !> that is not stable.
-  subroutine look_at_motion(input, stages, clock, schedule, model, doubts)
+  !>
+  !> Errors: a boundary that passes the whole body in one step.
+  subroutine look_at_motion(input, stages, clock, schedule, model, doubts, errors)
     type(input_t),    intent(in)    :: input
     type(stage_t),    intent(in)    :: stages(:)
     type(clock_t),    intent(in)    :: clock
     type(schedule_t), intent(in)    :: schedule
     type(model_t),    intent(inout) :: model    !! its highest frequency is found where needed
     type(doubts_t),   intent(inout) :: doubts
+    type(error_list_t), intent(inout) :: errors
 
     associate (strain => input%integration%final_strain)
       if (is_set(strain)) then
@@ -218,7 +222,8 @@ contains
       real(schedule%steps, wp), 'the whole run has only '//integer_text(schedule%steps)// &
       ' steps: waves have hardly passed the body, and the end is passed by up to a step; '// &
       'slower motion, or method = ''equilibrium''', '&integration')
-    call look_at_speed(input, clock%time_step, model, doubts)
+    call look_at_speed(input, clock%time_step, model, doubts, errors)
+    if (errors%count() > 0) return
     call look_at_stability(input, clock%time_step, model, doubts)
   end subroutine look_at_motion
 
@@ -261,12 +266,14 @@ contains
 
   end subroutine look_at_ramps
 
-  !> Warn of a boundary that moves so fast that the body cannot follow.
-  subroutine look_at_speed(input, time_step, model, doubts)
+  !> Warn of a boundary that moves so fast that the body cannot follow; refuse one that passes all
+  !> of it in a step, which nothing can survive.
+  subroutine look_at_speed(input, time_step, model, doubts, errors)
     type(input_t),  intent(in)    :: input
     real(wp),       intent(in)    :: time_step   !! [s]
     type(model_t),  intent(in)    :: model
     type(doubts_t), intent(inout) :: doubts
+    type(error_list_t), intent(inout) :: errors
     real(wp) :: extent, way
     integer  :: k
 
@@ -274,11 +281,15 @@ contains
     do k = 1, size(input%boundaries)
       way = time_step / extent * fastest(input%boundaries(k), &
         maxval(model%body%upper - model%body%lower))
-      if (is_doubtful('fast_boundary', way)) &
-        call doubts%add('fast_boundary', way, 'it moves by '// &
-        short_number(100.0_wp * way)//' % of the body in every step: it passes the body before '// &
-        'stresses can spread; velocities are in m/s', &
-        '&boundary name = '//input%boundaries(k)%name)
+      if (way >= 1.0_wp) then
+        call errors%add('the boundary passes the whole body in one step of '// &
+          short_number(time_step)//' s', '&boundary name = '//input%boundaries(k)%name, &
+          allowed='a velocity [m/s], density and stiffness that fit together')
+      else if (is_doubtful('fast_boundary', way)) then
+        call doubts%add('fast_boundary', way, 'it moves by '//short_number(100.0_wp * way)// &
+          ' % of the body in every step: it passes the body before stresses can spread; '// &
+          'velocities are in m/s', '&boundary name = '//input%boundaries(k)%name)
+      end if
     end do
   end subroutine look_at_speed
 

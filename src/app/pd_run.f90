@@ -108,8 +108,8 @@ contains
     call set_up_schedule(run%input, run%clock, run%model, run%schedule, errors)
     if (run%checkpoint%history_rows == 0) &
       run%limit = new_step_limit(run%model%highest_frequency, run%clock%time_step)
-    if (errors%count() == 0) &
-      call look_at_motion(run%input, run%stages, run%clock, run%schedule, run%model, run%doubts)
+    if (errors%count() == 0) call look_at_motion(run%input, run%stages, run%clock, run%schedule, &
+      run%model, run%doubts, errors)
     call outcome%end_if_any(errors, exit_input)
     if (outcome%done .or. options%check) return
     if (run%model%at_equilibrium) then

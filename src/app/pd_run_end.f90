@@ -8,7 +8,7 @@ module pd_run_end
   use pd_record, only: close_record, observe_state, record_failure, record_frame, record_line, &
     record_row
   use pd_run, only: run_t
-  use pd_text, only: integer_text, short_number
+  use pd_text, only: coordinate_text, integer_text, short_number
   use pd_timing, only: kernel_names
   use pd_unbalanced, only: loads_at
   implicit none
@@ -120,20 +120,21 @@ contains
     type(run_t),     intent(inout) :: run
     type(outcome_t), intent(inout) :: outcome
     type(error_list_t) :: errors, file_errors
-    character(160) :: where
+    character(:), allocatable :: where
 
     associate (x => run%model%points%position)
-      write (where, '(a,i0,a,es12.5,a,i0,a,g0.7,a,g0.7,a)') 'step ', run%clock%step, ', time ', &
-        run%clock%time(), ' s, point ', run%model%operators%storage%point_at(row), ' at (', &
-        x(row, 1), ', ', x(row, 2), ') m'
+      where = 'step '//integer_text(run%clock%step)//', time '//short_number(run%clock%time())// &
+        ' s, point '//integer_text(run%model%operators%storage%point_at(row))//' at ('// &
+        coordinate_text(x(row, 1), run%model%spacing)//', '// &
+        coordinate_text(x(row, 2), run%model%spacing)//') m'
     end associate
     call record_failure(run%model, run%state, run%clock, run%record, file_errors)
-    call record_line(run%record, 'the calculation failed: '//reason//'; '//trim(where)//'; '// &
+    call record_line(run%record, 'the calculation failed: '//reason//'; '//where//'; '// &
       state_at(row, run), file_errors)
     call tell_quality(run, .true., file_errors)
     call file_errors%print(error_unit)
     call errors%add('the calculation failed: '//reason//'; '//state_at(row, run)//'; the '// &
-      'frames and rows before this step are good; '//remedy(run)//' may help', trim(where))
+      'frames and rows before this step are good; '//remedy(run)//' may help', where)
     call outcome%end_if_any(errors, exit_calculation)
   end subroutine fail
 

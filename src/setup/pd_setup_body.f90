@@ -9,7 +9,7 @@ module pd_setup_body
   use pd_input_types, only: body_input_t, input_t
   use pd_kinds, only: is_set, wp
   use pd_random_field, only: longest_way
-  use pd_text, only: short_number
+  use pd_text, only: coordinate_text, number_text, short_number
   implicit none
   private
 
@@ -107,8 +107,8 @@ contains
       end do
       if (.not. any(in_patch .and. counts)) call errors%add( &
         'the weak patch holds no point of the body that can yield', '&imperfection', &
-        short_number(flaw%radius)//' m about '//short_number(flaw%x)//', '// &
-        short_number(flaw%y), 'a patch in the body, wider than the spacing')
+        short_number(flaw%radius)//' m about '//number_text(flaw%x)//', '//number_text(flaw%y), &
+        'a patch in the body, wider than the spacing')
     end associate
   end subroutine look_at_patch
 
@@ -147,7 +147,6 @@ contains
     type(lattice_t) :: lattice
     real(wp) :: origin(2), upper(2)
     logical  :: adjusted, known
-    character(120) :: text
     integer :: k
 
     associate (d => input%discretisation)
@@ -172,9 +171,12 @@ contains
     end do
     call region_body(shapes, origin, lattice, layers, body, errors)
     if (adjusted .and. errors%count() == 0) then
-      write (text, '(a,4(g0.8,a))') 'the body is adjusted to the spacing: x from ', body%lower(1), &
-        ' to ', body%upper(1), ' m, y from ', body%lower(2), ' to ', body%upper(2), ' m'
-      call doubts%add('body_adjusted', 0.0_wp, trim(text), '&body')
+      associate (dx => lattice%spacing)
+        call doubts%add('body_adjusted', 0.0_wp, 'the body is adjusted to the spacing: x from '// &
+          coordinate_text(body%lower(1), dx)//' to '//coordinate_text(body%upper(1), dx)// &
+          ' m, y from '//coordinate_text(body%lower(2), dx)//' to '// &
+          coordinate_text(body%upper(2), dx)//' m', '&body')
+      end associate
     end if
   end subroutine shaped_body
 

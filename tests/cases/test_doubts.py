@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from case_files import SHEET, SPECIMEN, begin, changed, stop, without_group
 
+ROOT = Path(__file__).resolve().parents[2]
 SHORT = changed(SPECIMEN, frame_strains=None).replace("history_count = 100", "frame_count = 1")
 PUSHED = without_group(
     changed(SHORT, final_strain=None).replace("&integration ", "&integration end_time = 0.2, "),
@@ -242,6 +243,29 @@ def test_an_increment_that_is_not_at_rest_is_told(program, run_case, tmp_path):
     assert "no_rest" not in told(done.stdout)
 
 
+def test_a_boundary_that_passes_the_body_in_a_step_is_refused(run_case, tmp_path):
+    for change in ({"velocity": "0.0, -1.0e3"}, {"density": "1.0e99"}):
+        done = run_case(changed(PUSHED, **change), tmp_path, "--check")
+        assert done.returncode == 2
+        assert "name = top: the boundary passes the whole body in one step" in done.stderr
+
+
+def test_places_have_the_digits_that_they_need(run_case, tmp_path):
+    probe = "&probe name = 'p', x = 500000.26, y = 4649776.71 /\n"
+    text = changed(SHORT, x_min="500000.0", x_max="500000.5", y_min="4649776.0", y_max="4649777.0")
+    done = run_case(without_group(text, "imperfection") + probe, tmp_path, "--check")
+    assert done.returncode == 0, done.stderr
+    assert "at (500000.3, 4649776.7) m" in done.stdout
+    assert "body                0.5 m x 1 m" in done.stdout
+
+
+@pytest.mark.parametrize("length", ["2147483648", "214748364.8", "1.0e99"])
+def test_a_body_beyond_counting_is_refused(run_case, tmp_path, length):
+    done = run_case(changed(SHORT, y_max=length), tmp_path, "--check")
+    assert done.returncode == 2
+    assert "too many points" in done.stderr
+
+
 def test_doubts_at_the_start_stand_in_log_and_result(run_case, tmp_path):
     text = changed(AT_START["few_points"][0], density="2.0e9")
     done = run_case(text, tmp_path)
@@ -268,6 +292,13 @@ def test_doubts_go_through_a_restart(program, run_case, tmp_path):
     assert "older_checkpoint" not in second
     assert stop(begin(program, tmp_path, text, "--restart"), signal.SIGTERM, tmp_path, 30) == 143
     assert "older_checkpoint" in doubts_of(tmp_path / "out" / "case.h5")
+
+
+@pytest.mark.parametrize("path", sorted((ROOT / "input").rglob("*.nml")), ids=lambda p: p.stem)
+def test_inputs_that_are_shipped_are_plausible(perigeo, tmp_path, path):
+    done = perigeo(["--check", path], tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert told(done.stdout) == set()
 
 
 def test_a_failure_tells_the_state_at_the_point_and_what_helps(run_case, tmp_path):
@@ -328,5 +359,5 @@ def test_every_doubt_is_tried_here_and_stands_in_the_documents(perigeo, tmp_path
     names = re.findall(r"^\| `(\w+)` \|", table, re.MULTILINE)
     assert set(names) == {*AT_START, *IN_THE_RUN, "no_rest", "older_checkpoint"}
     assert len(names) == len(set(names))
-    page = (Path(__file__).resolve().parents[2] / "doc" / "doubts.md").read_text()
+    page = (ROOT / "doc" / "doubts.md").read_text()
     assert table in page
