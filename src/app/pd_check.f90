@@ -3,6 +3,7 @@ module pd_check
   use, intrinsic :: iso_fortran_env, only: output_unit
   use omp_lib, only: omp_get_max_threads
   use pd_command_line, only: options_t, print_help
+  use pd_doubt_list, only: write_doubt_table
   use pd_errors, only: error_list_t, exit_file, exit_input, exit_ok, outcome_t
   use pd_input, only: print_input
   use pd_input_reference, only: write_input_reference, write_input_reference_json
@@ -33,7 +34,8 @@ contains
     else if (options%input_reference) then
       call write_input_reference(all_keys(), output_unit)
     end if
-    if (options%help .or. options%version .or. options%input_reference) then
+    if (options%doubts) call write_doubt_table(output_unit)
+    if (options%help .or. options%version .or. options%input_reference .or. options%doubts) then
       call outcome%end_with(exit_ok)
     else if (options%print_input) then
       call print_input(options%input_path, output_unit, errors, options%settings)
@@ -56,16 +58,13 @@ contains
     call outcome%end_if_any(errors, exit_file)
     if (outcome%done) return
     call find_highest_frequency(run%model)
-    if (.not. run%model%at_equilibrium .and. &
-      run%clock%time_step * run%model%highest_frequency > 2.0_wp) call run%warnings%add( &
-      'the time step is larger than the stable one: the run will not last', '&integration')
     summary = summarise(run%input, run%model, run%clock, run%schedule)
     write (output_unit, '(a)') path//': the input is right'
     do i = 1, size(summary%lines)
       write (output_unit, '(a)') trim(summary%lines(i))
     end do
     call print_estimate(estimated_seconds(run%model, run%schedule))
-    call run%warnings%print(output_unit, 'warning')
+    call run%doubts%print(output_unit)
     call outcome%end_with(exit_ok)
   end subroutine print_check
 

@@ -18,7 +18,7 @@ module pd_command_line
     integer :: threads = 0                    !! 0: as OMP_NUM_THREADS says
     logical :: check = .false., restart = .false., force = .false., quiet = .false.
     logical :: version = .false., help = .false., input_reference = .false.
-    logical :: json = .false., print_input = .false.
+    logical :: json = .false., print_input = .false., doubts = .false.
   end type options_t
 
 contains
@@ -60,6 +60,8 @@ contains
         options%help = .true.
       case ('--input-reference')
         options%input_reference = .true.
+      case ('--doubts')
+        options%doubts = .true.
       case ('--json')
         options%json = .true.
       case ('--print-input')
@@ -134,7 +136,7 @@ contains
       '--json goes with --input-reference')
     if (options%points_path /= '' .and. .not. options%check) call errors%add( &
       '--points goes with --check')
-    if (options%version .or. options%help .or. options%input_reference) return
+    if (options%version .or. options%help .or. options%input_reference .or. options%doubts) return
     if (options%input_path == '' .and. errors%count() == 0) &
       call errors%add('no input file is given; perigeo --help shows how')
     if (options%restart .and. options%force) call errors%add('--restart goes on with the '// &
@@ -161,9 +163,9 @@ contains
   subroutine report_unknown(word, errors)
     character(*),       intent(in)    :: word
     type(error_list_t), intent(inout) :: errors
-    character(17), parameter :: known(13) = [character(17) :: '--check', '--output', '--threads', &
+    character(17), parameter :: known(14) = [character(17) :: '--check', '--output', '--threads', &
       '--restart', '--force', '--quiet', '--version', '--help', '--input-reference', '--json', &
-      '--set', '--print-input', '--points']
+      '--set', '--print-input', '--points', '--doubts']
     character(:), allocatable :: near
 
     near = nearest_name(word, known)
@@ -208,6 +210,7 @@ contains
       '  --print-input       print an input file with all values as used; run nothing', &
       '  --input-reference   print the tables of all input keys (see doc/input.md); with', &
       '                      --json for programs', &
+      '  --doubts            print the table of what a run is warned of (see doc/doubts.md)', &
       '  --version, --help', &
       '', &
       'Results, in the output folder: <name>_history.csv (curves), <name>.h5 (fields),', &

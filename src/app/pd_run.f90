@@ -1,12 +1,13 @@
 !> A run: what it consists of, and how it begins.
 module pd_run
-  use, intrinsic :: iso_fortran_env, only: compiler_version, int64
+  use, intrinsic :: iso_fortran_env, only: compiler_version, int64, output_unit
   use omp_lib, only: omp_get_max_threads
   use pd_body_force, only: body_force_t, new_body_force
   use pd_checkpoint, only: checkpoint_mark, checkpoint_t
   use pd_clock, only: clock_t
   use pd_command_line, only: options_t
-  use pd_errors, only: error_list_t, exit_file, exit_input, exit_model, outcome_t
+  use pd_doubt_list, only: doubts_t
+  use pd_errors, only: error_list_t, exit_file, exit_input, exit_model, exit_ok, outcome_t
   use pd_files, only: prepare_folder
   use pd_history_columns, only: history_columns
   use pd_increment, only: begin_increments, increments_t, new_increments
@@ -18,8 +19,10 @@ module pd_run
   use pd_model, only: model_t, move_planes, release_set_up, start
   use pd_observe, only: column_t, moment_at, observation_t, observe
   use pd_own_files, only: keep_inputs, lock_path
-  use pd_record, only: load_checkpoint, observe_state, open_record, record_frame, record_line, &
-    record_progress, record_row, record_t, results_in_the_way, same_history, same_points
+  use pd_plausibility, only: look_at_model, look_at_motion
+  use pd_record, only: largest_reaction_before, load_checkpoint, load_doubts, look_for_end, &
+    observe_state, open_record, record_doubts, record_frame, record_line, record_progress, &
+    record_row, record_t, results_in_the_way, same_history, same_points
   use pd_reversal, only: new_reversal, reversal_t
   use pd_run_description, only: provenance_t
   use pd_schedule, only: schedule_t
@@ -57,15 +60,11 @@ module pd_run
     type(timing_t)     :: timing
     type(checkpoint_t) :: checkpoint          !! to continue from; no rows: a new run
     character(:), allocatable :: mark         !! of its file
-    type(error_list_t) :: warnings
     logical :: whole = .false.                !! files are open, and the state is one to go on from
     type(error_list_t) :: trouble             !! with files, in a step whose state is not whole
-    logical :: doubted = .false.              !! the energy balance has been warned of
+    type(doubts_t)     :: doubts
     logical :: jump_told = .false.            !! at equilibrium
-    logical :: balance_doubted = .false.      !! that of the forces, too
-    logical :: control_doubted = .false.      !! the part of the control in the work, too
-    logical :: step_doubted = .false.         !! the time step that the user has fixed, too
-    logical :: flow_doubted = .false.         !! flow that turns back, too
+    real(wp) :: largest_reaction = 0.0_wp     !! of a platen so far [N/m]
     integer(int64) :: last_checkpoint = 0     !! count of the system clock
     integer(int64) :: loop_start = 0          !! count of the system clock
   end type run_t
@@ -105,7 +104,7 @@ contains
     call outcome%end_if_any(errors, exit_model)
     if (outcome%done) return
     call keep_standing_load(run, run%stages(run%checkpoint%clock%stage), run%model)
-    call look_at_model(run)
+    call look_at_model(run%input, run%model, run%doubts)
     if (run%checkpoint%history_rows > 0) then
       if (.not. same_history(run%state, run%model)) &
         call errors%add('the laws remember something else than in the checkpoint', run%input%path, &
@@ -118,6 +117,8 @@ contains
     call set_up_schedule(run%input, run%clock, run%model, run%schedule, errors)
     if (run%checkpoint%history_rows == 0) &
       run%limit = new_step_limit(run%model%highest_frequency, run%clock%time_step)
+    if (errors%count() == 0) call look_at_motion(run%input, run%stages, run%clock, run%schedule, &
+      run%model, run%doubts, errors)
     call outcome%end_if_any(errors, exit_input)
     if (outcome%done .or. options%check) return
     if (run%model%at_equilibrium) then
@@ -135,14 +136,14 @@ contains
     call set_up_whole(run%input, run%stages, run%model%whole, input_errors, errors)
     if (errors%count() + input_errors%count() > 0) return
     call set_up_stage_body(run%input, run%stages(run%checkpoint%clock%stage), run%model%whole, &
-      run%model%body, run%warnings, input_errors, errors)
+      run%model%body, run%doubts, input_errors, errors)
   end subroutine set_up_bodies
 
   !> Set up the models of all stages before the first one runs.
   subroutine try_later_stages(run, errors)
     type(run_t),        intent(in)    :: run
     type(error_list_t), intent(inout) :: errors
-    type(error_list_t) :: unheard
+    type(doubts_t) :: unheard
     type(model_t) :: model, empty
     integer :: k
 
@@ -190,13 +191,14 @@ contains
     type(run_t),   intent(in)    :: run
     type(stage_t), intent(in)    :: stage   !! of the model
     type(model_t), intent(inout) :: model
+    type(doubts_t) :: doubts
     type(error_list_t) :: unheard
     type(model_t) :: first
     integer :: k
 
     if (.not. stage%start_time > 0.0_wp .or. .not. is_set(run%input%initial_stress%k0)) return
     first%whole = model%whole
-    call set_up_stage_body(run%input, run%stages(1), first%whole, first%body, unheard, unheard, &
+    call set_up_stage_body(run%input, run%stages(1), first%whole, first%body, doubts, unheard, &
       unheard)
     call set_up_model(run%input, first, unheard, run%stages(1))
     do k = 1, size(first%loads%items)
@@ -208,68 +210,6 @@ contains
       end select
     end do
   end subroutine keep_standing_load
-
-  !> Warn of what can be set up and is hardly meant.
-  subroutine look_at_model(run)
-    type(run_t), intent(inout) :: run
-    integer :: k
-
-    associate (materials => run%model%materials, path => run%input%path)
-      do k = 1, size(materials%list)
-        if (.not. materials%is_used(k)) call run%warnings%add('no point has the material '''// &
-          materials%list(k)%name//'''; &body material chooses one', path)
-      end do
-    end associate
-    if (is_set(run%input%initial_stress%k0)) call look_at_ground(run)
-    if (.not. allocated(run%model%body%place)) call look_at_cloud(run)
-    do k = 1, size(run%model%loads%items)
-      associate (load => run%model%loads%items(k)%load)
-        if (allocated(load%doubt)) &
-          call run%warnings%add(load%doubt, '&'//load%kind//' name = '//load%name)
-      end associate
-    end do
-  end subroutine look_at_model
-
-  !> Warn of ground under horizontal stress that nothing bears but the load that holds it.
-  subroutine look_at_ground(run)
-    type(run_t), intent(inout) :: run
-    character(5), parameter :: walls(2) = [character(5) :: 'left', 'right']
-    logical :: borne
-    integer :: j, k
-
-    if (.not. run%input%initial_stress%k0 > 0.0_wp) return
-    do k = 1, size(walls)
-      borne = .false.
-      do j = 1, size(run%input%boundaries)
-        borne = borne .or. run%input%boundaries(j)%side == walls(k) &
-          .or. run%input%boundaries(j)%side == 'all'
-      end do
-      if (.not. borne) call run%warnings%add('the '//trim(walls(k))//' side has no boundary: '// &
-        'its initial stress is held for good as if the ground went on there', '&initial_stress k0')
-    end do
-  end subroutine look_at_ground
-
-  !> Warn of a cloud of points whose weights or zero-energy modes make stresses too small.
-  subroutine look_at_cloud(run)
-    type(run_t), intent(inout) :: run
-    real(wp), parameter :: hardly_any = 1.0e-6_wp
-
-    associate (left => run%model%unbalanced)
-      if (left(2) > hardly_any) call run%warnings%add('no weights were found with which a '// &
-        'homogeneous stress is in equilibrium inside the cloud: stresses near points of uneven '// &
-        'families come out wrong', '&body file')
-      if (run%input%stabilisation%method /= 'none') return
-      if (left(1) > hardly_any .and. (left(2) < 0.0_wp .or. left(2) > hardly_any)) then
-        call run%warnings%add('points off a lattice without control: a homogeneous stress is '// &
-          'not in equilibrium inside them, and stresses come out much too small; balanced '// &
-          'weights and a control of zero-energy modes help', '&stabilisation method')
-      else
-        call run%warnings%add('points off a lattice without control: where they flow, '// &
-          'zero-energy modes carry a part of the displacement, and loads come out some per '// &
-          'cent too small; a control helps', '&stabilisation method')
-      end if
-    end associate
-  end subroutine look_at_cloud
 
   !> Output folder and name of a run.
   pure function stem_of(run) result(stem)
@@ -286,20 +226,31 @@ contains
     type(run_t),     intent(inout) :: run
     type(outcome_t), intent(inout) :: outcome
     type(error_list_t) :: errors, input_errors
-    character(:), allocatable :: warning, living
+    character(:), allocatable :: living, warning
+    logical :: complete, same
 
     living = lock_holder(lock_path(stem_of(run)))
     if (living /= '') call errors%add(living, stem_of(run))
     call outcome%end_if_any(errors, exit_file)
     if (outcome%done) return
     if (options%restart) then
+      call look_for_end(run%input, complete, same)
+      if (complete .and. same) then
+        if (.not. options%quiet) write (output_unit, '(a)') 'the run is finished: '// &
+          stem_of(run)//'.h5 is complete; a later end goes on from a checkpoint, --force begins anew'
+        call outcome%end_with(exit_ok)
+        return
+      end if
       run%mark = checkpoint_mark(stem_of(run))
       call load_checkpoint(run%input, run%checkpoint, run%state, run%ledger, warning, errors, &
         input_errors)
+      if (complete .and. errors%count() > 0) call errors%add('the run is finished, and no '// &
+        'state was kept from which it could go on; &output checkpoint_every keeps one')
       call outcome%end_if_any(errors, exit_file)
       call outcome%end_if_any(input_errors, exit_input)
       if (outcome%done) return
-      if (warning /= '') call run%warnings%add(warning)
+      if (warning /= '') call run%doubts%add('older_checkpoint', 0.0_wp, warning)
+      call load_doubts(stem_of(run), run%checkpoint, run%doubts)
     else
       call refuse_results(options, run, errors)
       call outcome%end_if_any(errors, exit_file)
@@ -394,9 +345,12 @@ contains
       do i = 1, size(summary%lines)
         call record_line(record, trim(summary%lines(i)), errors)
       end do
-      do i = 1, run%warnings%count()
-        call record_line(record, 'warning: '//run%warnings%message(i), errors)
+      do i = 1, run%doubts%count()
+        call record_line(record, 'warning: '//run%doubts%message(i), errors)
       end do
+      call record_doubts(record, run%doubts, errors)
+      if (run%checkpoint%history_rows > 0) call largest_reaction_before(record, run%model, &
+        run%checkpoint%history_rows, run%largest_reaction)
       call observe_state(run%model, run%state, run%ledger, run%clock, record)
       if (run%checkpoint%history_rows == 0) then
         call record_row(record, errors)

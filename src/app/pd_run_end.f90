@@ -1,12 +1,14 @@
 !> How a run ends: complete, at the limit of its loads, or with a failure.
 module pd_run_end
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use, intrinsic :: iso_fortran_env, only: error_unit, int64
-  use pd_errors, only: error_list_t, exit_calculation, exit_file, exit_ok, outcome_t
+  use pd_errors, only: error_list_t, exit_calculation, exit_file, outcome_t
   use pd_kinds, only: wp
+  use pd_quality, only: tell_quality
   use pd_record, only: close_record, observe_state, record_failure, record_frame, record_line, &
     record_row, save_last_checkpoint
   use pd_run, only: run_t
-  use pd_text, only: integer_text, short_number
+  use pd_text, only: coordinate_text, integer_text, short_number
   use pd_timing, only: kernel_names
   use pd_unbalanced, only: loads_at
   implicit none
@@ -17,7 +19,7 @@ module pd_run_end
 contains
 
   !> No equilibrium was found. Under loads that is their limit: the last equilibrium is written, and
-  !> the run is finished. Without loads, or from the start, it is a failure.
+  !> the run is to be finished. Without loads, or from the start, it is a failure.
   subroutine end_without_equilibrium(run, outcome)
     type(run_t),     intent(inout) :: run
     type(outcome_t), intent(inout) :: outcome
@@ -58,8 +60,6 @@ contains
     if (size(run%input%strength_reduction) > 0) call record_line(run%record, &
       'no factor of safety: the body does not bear the loads of the end of the run', errors)
     call outcome%end_if_any(errors, exit_file)
-    if (.not. outcome%done) call finish_run(run, outcome)
-    if (.not. outcome%done) call outcome%end_with(exit_ok)
   end subroutine end_without_equilibrium
 
   !> How far the present stage has come; '' without stages.
@@ -82,14 +82,36 @@ contains
     fastest_row = maxloc(sum((run%model%points%free * run%state%velocity)**2, dim=2), dim=1)
   end function fastest_row
 
-  !> What mends a balance.
+  !> What mends a balance. Without a control of zero-energy modes these grow until the state fails:
+  !> shorter steps then fail at the same strain.
   pure function remedy(run) result(text)
     type(run_t), intent(in) :: run
     character(:), allocatable :: text
 
     text = 'a smaller safety or time step'
     if (run%model%at_equilibrium) text = 'a larger number of increments'
+    if (run%input%stabilisation%method == 'none') text = 'a control of zero-energy modes '// &
+      '(&stabilisation method = ''relaxing''), else '//text//','
   end function remedy
+
+  !> Strain, det F and zero-energy part of the deformation at a row, in words.
+  function state_at(row, run) result(text)
+    integer,     intent(in) :: row
+    type(run_t), intent(in) :: run
+    character(:), allocatable :: text
+    real(wp) :: z2(run%model%operators%n)
+
+    associate (h => run%state%displacement_gradient(row, :))
+      text = 'not a number there'
+      if (.not. all(ieee_is_finite(h)) .or. maxval(abs(h)) > 1.0e100_wp) return
+      call run%model%operators%zero_energy_squared(run%state%displacement, &
+        run%state%displacement_gradient, z2)
+      text = 'there strain is '//short_number(h(1))//', '//short_number(h(4))//', '// &
+        short_number(0.5_wp * (h(2) + h(3)))//' (xx, yy, xy), det F '// &
+        short_number((1.0_wp + h(1)) * (1.0_wp + h(4)) - h(2) * h(3))//', zero_energy '// &
+        short_number(sqrt(z2(row) / run%model%operators%weight_sum(row)) / run%model%delta)
+    end associate
+  end function state_at
 
   !> The calculation has failed: write the state apart from the valid frames, and report where.
   subroutine fail(reason, row, run, outcome)
@@ -98,18 +120,21 @@ contains
     type(run_t),     intent(inout) :: run
     type(outcome_t), intent(inout) :: outcome
     type(error_list_t) :: errors, file_errors
-    character(160) :: where
+    character(:), allocatable :: where
 
     associate (x => run%model%points%position)
-      write (where, '(a,i0,a,es12.5,a,i0,a,g0.7,a,g0.7,a)') 'step ', run%clock%step, ', time ', &
-        run%clock%time(), ' s, point ', run%model%operators%storage%point_at(row), ' at (', &
-        x(row, 1), ', ', x(row, 2), ') m'
+      where = 'step '//integer_text(run%clock%step)//', time '//short_number(run%clock%time())// &
+        ' s, point '//integer_text(run%model%operators%storage%point_at(row))//' at ('// &
+        coordinate_text(x(row, 1), run%model%spacing)//', '// &
+        coordinate_text(x(row, 2), run%model%spacing)//') m'
     end associate
     call record_failure(run%model, run%state, run%clock, run%record, file_errors)
-    call record_line(run%record, 'the calculation failed: '//reason//'; '//trim(where), file_errors)
+    call record_line(run%record, 'the calculation failed: '//reason//'; '//where//'; '// &
+      state_at(row, run), file_errors)
+    call tell_quality(run, .true., file_errors)
     call file_errors%print(error_unit)
-    call errors%add('the calculation failed: '//reason//'; the frames and rows before this '// &
-      'step are good; '//remedy(run)//' may help', trim(where))
+    call errors%add('the calculation failed: '//reason//'; '//state_at(row, run)//'; the '// &
+      'frames and rows before this step are good; '//remedy(run)//' may help', where)
     call outcome%end_if_any(errors, exit_calculation)
   end subroutine fail
 
@@ -119,6 +144,7 @@ contains
     type(outcome_t), intent(inout) :: outcome
     type(error_list_t) :: errors
 
+    call tell_quality(run, .false., errors)
     call tell_where_time_went(run, errors)
     call record_line(run%record, 'results in '//run%record%stem//'.h5, .xdmf, _history.csv', errors)
     call close_record(run%record, errors)

@@ -6,6 +6,7 @@
 !> stage (a load, `pd_body_force`).
 !> Source: doc/theory.md, section 7.
 module pd_run_stages
+  use pd_doubt_list, only: doubts_t
   use pd_errors, only: error_list_t, exit_file, exit_input, exit_model, outcome_t
   use pd_fields, only: clearing_t
   use pd_forces, only: forces
@@ -62,7 +63,8 @@ contains
     type(run_t),     intent(inout) :: run
     type(model_t),   intent(out)   :: model
     type(outcome_t), intent(inout) :: outcome
-    type(error_list_t) :: errors, input_errors, heard_before
+    type(error_list_t) :: errors, input_errors
+    type(doubts_t) :: heard_before
 
     model%whole = run%model%whole
     associate (stage => run%stages(run%clock%stage + 1))

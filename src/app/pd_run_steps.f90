@@ -2,7 +2,7 @@
 !> signal stops the run.
 module pd_run_steps
   use, intrinsic :: iso_fortran_env, only: int64
-  use pd_doubts, only: look_at_balance
+  use pd_doubts, only: look_at_balance, look_at_frame
   use pd_errors, only: error_list_t, exit_file, exit_interrupted, exit_terminated, outcome_t
   use pd_kinds, only: wp
   use pd_progress, only: progress_due
@@ -93,6 +93,7 @@ contains
     type(error_list_t), intent(inout) :: errors
     integer :: k
 
+    if (due%frame) call look_at_frame(run, errors)
     do k = 1, merge(run%schedule%frames_due(run%clock%step), 0, due%frame)
       call record_frame(run%model, run%state, run%record, errors)
     end do

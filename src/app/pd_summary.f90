@@ -13,7 +13,7 @@ module pd_summary
   use pd_relaxation, only: numbers_per_row
   use pd_schedule, only: schedule_t
   use pd_state, only: state_t
-  use pd_text, only: number => short_number, whole => integer_text
+  use pd_text, only: coordinate_text, number => short_number, whole => integer_text
   implicit none
   private
 
@@ -235,8 +235,9 @@ contains
     do k = 1, size(model%probes)
       associate (probe => model%probes(k), x => model%points%position(model%probes(k)%row, :))
         call summary%add('probe', probe%name//': point '// &
-          whole(model%operators%storage%point_at(probe%row))//' at ('//number(x(1))//', '// &
-          number(x(2))//') m, '//number(probe%distance)//' m from where it was asked for')
+          whole(model%operators%storage%point_at(probe%row))//' at ('// &
+          coordinate_text(x(1), model%spacing)//', '//coordinate_text(x(2), model%spacing)// &
+          ') m, '//number(probe%distance)//' m from where it was asked for')
       end associate
     end do
   end subroutine add_probes

@@ -6,7 +6,7 @@ program perigeo
   use omp_lib, only: omp_set_num_threads
   use pd_check, only: answer_questions, print_check
   use pd_command_line, only: options_t, read_command_line
-  use pd_doubts, only: look_at_time_step
+  use pd_doubts, only: look_at_end, look_at_time_step
   use pd_errors, only: error_list_t, exit_command_line, outcome_t
   use pd_exit, only: leave
   use pd_increment, only: take_increment
@@ -40,7 +40,10 @@ program perigeo
     if (run%model%at_equilibrium) then
       call take_increment(run%clock, run%schedule, run%model, run%state, run%increments, &
         run%ledger, run%timing)
-      if (run%increments%lost) call end_without_equilibrium(run, outcome)
+      if (run%increments%lost) then
+        call end_without_equilibrium(run, outcome)
+        exit
+      end if
       due = due_after_step(run%clock%step, run)
       failed_row = 0
     else
@@ -53,7 +56,8 @@ program perigeo
     call write_what_is_due(due, failed_row, run, outcome)
     call begin_stage_if_due(run, outcome)
   end do
-  if (.not. outcome%done) call find_factor_of_safety(run, outcome)
+  if (.not. outcome%done) call look_at_end(run, outcome)
+  if (.not. (outcome%done .or. run%increments%lost)) call find_factor_of_safety(run, outcome)
   if (.not. outcome%done) call finish_run(run, outcome)
   call keep_state(run, outcome)
   call release_lock(run%lock)

@@ -6,7 +6,8 @@ module pd_text
   private
 
   public :: lower_case, is_name, nearest_name, quoted_list, shortened
-  public :: number_text, numbers_text, short_number, integer_text, read_number, read_integer
+  public :: number_text, numbers_text, short_number, coordinate_text, integer_text
+  public :: read_number, read_integer
 
   character(*), parameter :: digits = '0123456789'
   character(*), parameter :: letters = 'abcdefghijklmnopqrstuvwxyz'
@@ -177,7 +178,9 @@ contains
     integer :: decimals
 
     if (abs(x) >= 1.0e7_wp .or. (abs(x) < 1.0e-3_wp .and. abs(x) > 0.0_wp)) then
-      write (buffer, '(es12.4)') x
+      write (buffer, '(es14.4e3)') x
+      text = shortest_exponent(adjustl(buffer))
+      return
     else if (abs(x - anint(x)) <= 1.0e-9_wp * abs(x)) then
       write (buffer, '(i0)') nint(x)
     else
@@ -189,6 +192,41 @@ contains
     end if
     text = trim(adjustl(buffer))
   end function short_number
+
+  !> A number with exponent without its zeros: 5.0000E+007 as 5e7.
+  pure function shortest_exponent(number) result(text)
+    character(*), intent(in) :: number
+    character(:), allocatable :: text, mantissa
+    integer :: e, exponent
+
+    e = scan(number, 'E')
+    read (number(e + 1:), '(i5)') exponent
+    mantissa = number(:verify(number(:e - 1), '0', back=.true.))
+    if (mantissa(len(mantissa):) == '.') mantissa = mantissa(:len(mantissa) - 1)
+    text = mantissa//'e'//integer_text(exponent)
+  end function shortest_exponent
+
+  !> A coordinate to a thousandth of a length, however far it is from the origin.
+  pure function coordinate_text(x, length) result(text)
+    real(wp), intent(in) :: x, length   !! length > 0
+    character(:), allocatable :: text
+    real(wp), parameter :: farthest = 1.0e15_wp   ! no more digits are good
+    character(40) :: buffer
+    character(8)  :: form
+    integer :: decimals
+
+    decimals = min(20, max(0, 3 - floor(log10(length))))
+    if (.not. abs(x) < farthest) then
+      text = short_number(x)
+      return
+    end if
+    write (form, '(a,i0,a)') '(f40.', decimals, ')'
+    write (buffer, form) x
+    if (decimals > 0) buffer = buffer(:verify(trim(buffer), '0', back=.true.))
+    if (buffer(len_trim(buffer):) == '.') buffer = buffer(:len_trim(buffer) - 1)
+    text = trim(adjustl(buffer))
+    if (text == '-0') text = '0'
+  end function coordinate_text
 
   !> Read a real number: [+-]digits[.digits][e|d[+-]digits]. `problem` says what is wrong with it,
   !> and is empty if nothing is.

@@ -19,11 +19,11 @@ module pd_input
   use pd_shape_checks, only: check_shapes
   use pd_stage_checks, only: check_stages
   use pd_text_file, only: read_text_file
-  use pd_used_values, only: compare_used, used_values
+  use pd_used_values, only: compare_used, same_end, used_values
   implicit none
   private
 
-  public :: read_input, print_input, used_values, compare_used, resolved_path
+  public :: read_input, print_input, used_values, compare_used, same_end, resolved_path
   public :: setting_t
 
 contains

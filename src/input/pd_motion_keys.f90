@@ -65,8 +65,9 @@ contains
       meaning='end of the run, time step and damping'))
     call visitor%real_key(key_t('end_time', unit='s', range=positive, &
       also='this or final_strain, never both', meaning='end of the run'), self%end_time)
-    call visitor%real_key(key_t('final_strain', unit='1', range=positive, &
-      also='only with platens', meaning='nominal strain at which the run ends'), &
+    call visitor%real_key(key_t('final_strain', unit='1', &
+      range=range_t(0.0_wp, 1.0_wp, .true., .true.), also='only with platens; no per cent', &
+      meaning='nominal strain at which the run ends'), &
       self%final_strain)
     call visitor%text_key(key_t('time_step_rule', default='spectral', needs_effect=.true., &
       choices='courant spectral fixed', also='not at equilibrium', &

@@ -92,8 +92,8 @@ contains
     if (.not. known) return
     extent = upper(axis) - lower(axis)
     if (input%bodies(1)%shape == 'rectangle' .and. is_set(input%discretisation%spacing)) &
-      extent = floor(extent/input%discretisation%spacing + 0.5_wp + 1.0e-6_wp) &
-               *input%discretisation%spacing
+      extent = aint(extent/input%discretisation%spacing + 0.5_wp + 1.0e-6_wp) &
+               *input%discretisation%spacing   ! aint: of any size
     if (extent <= 0.0_wp) extent = unset
   end function platen_extent
 

@@ -67,7 +67,7 @@ contains
 
     call visitor%group(group_key_t('output', meaning='what is written and when'))
     call visitor%list_key(key_t('frame_strains', count=any_count, unit='1', stands_for='none', &
-      range=positive, also=one//'; only with platens', &
+      range=range_t(0.0_wp, 1.0_wp, .true., .true.), also=one//'; only with platens', &
       meaning='nominal strains at which a frame is written'), self%frame_strains)
     call visitor%list_key(key_t('frame_times', count=any_count, unit='s', stands_for='none', &
       range=positive, also=one, meaning='times at which a frame is written'), self%frame_times)

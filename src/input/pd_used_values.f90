@@ -9,7 +9,7 @@ module pd_used_values
   implicit none
   private
 
-  public :: used_values, compare_used, used_list_t, numbers_text
+  public :: used_values, compare_used, same_end, used_list_t, numbers_text
 
   type :: line_t
     character(:), allocatable :: text
@@ -203,6 +203,23 @@ contains
     end subroutine report
 
   end subroutine compare_used
+
+  !> Whether two runs end alike.
+  pure logical function same_end(old, new) result(same)
+    character(*), intent(in) :: old(:), new(:)   !! values as used
+    integer :: i, j
+
+    same = .true.
+    do i = 1, size(new)
+      if (.not. is_end(key_in(new(i)))) cycle
+      j = place_in(old, key_in(new(i)))
+      if (j == 0) then
+        same = .false.
+      else
+        same = same .and. value_in(old(j)) == value_in(new(i))
+      end if
+    end do
+  end function same_end
 
   pure logical function may_differ(key)
     character(*), intent(in) :: key

@@ -15,6 +15,7 @@ module pd_loads
     character(:), allocatable :: name
     character(:), allocatable :: kind              !! in a word
     character(:), allocatable :: doubt             !! what to warn of; not allocated: nothing
+    real(wp) :: doubted = 0.0_wp                   !! the number that it is about
   contains
     procedure(add_forces),  deferred :: add_forces
     procedure(work),        deferred :: work

@@ -7,6 +7,7 @@
 !> Source: doc/theory.md, section 7.
 module pd_pressure
   use pd_balance, only: left_by_unit_stress
+  use pd_doubt_list, only: doubt_kinds, kind_number
   use pd_edge_weights, only: edge_weights_t
   use pd_edges, only: edge_t
   use pd_kinds, only: wp
@@ -47,10 +48,6 @@ module pd_pressure
     real(wp) :: spacing = 0.0_wp              !! dx [m]
     real(wp) :: delta = 0.0_wp                !! horizon [m]
   end type surface_t
-
-  !> Horizons between a pressure and what holds the body, below which the stress is more than 3 %
-  !> too small.
-  real(wp), parameter :: least_depth = 1.5_wp
 
 contains
 
@@ -220,11 +217,13 @@ contains
     type(surface_t),  intent(in)    :: surface
     real(wp),         intent(in)    :: depth   !! of the first point that is held [m]
     type(pressure_t), intent(inout) :: pressure
+    real(wp) :: least   ! horizons, below which the stress is more than 3 % too small
 
+    least = doubt_kinds(kind_number('thin_body'))%lower
     ! half a spacing, with the layout nodes one, is between the body and this point
-    if (depth - 0.5_wp * surface%spacing >= (least_depth - 1.0e-6_wp) * surface%delta) &
-      return
-    pressure%doubt = 'the body is less than '//short_number(least_depth)//' horizons thick '// &
+    if (depth - 0.5_wp * surface%spacing >= (least - 1.0e-6_wp) * surface%delta) return
+    pressure%doubted = (depth - 0.5_wp * surface%spacing) / surface%delta
+    pressure%doubt = 'the body is less than '//short_number(least)//' horizons thick '// &
       'between the pressure and the boundary that holds it: the stress under the pressure '// &
       'comes out up to 11 % too small at one horizon, 18 % at two thirds; a smaller horizon helps'
   end subroutine doubt_depth

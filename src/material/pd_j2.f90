@@ -27,7 +27,7 @@ module pd_j2
     procedure :: reduced
   end type j2_t
 
-  real(wp), parameter :: tiny_modulus = 1.0e-30_wp   !! keeps unused quotients finite
+  real(wp), parameter :: tiny_square = 1.0e-30_wp    !! keeps unused quotients finite [Pa^2]
   real(wp), parameter :: far = 1.0e100_wp            !! a plastic increment that no point reaches
   real(wp), parameter :: root_3_2 = sqrt(1.5_wp), root_2_3 = sqrt(2.0_wp / 3.0_wp)
 
@@ -163,7 +163,7 @@ contains
     real(wp),         intent(out) :: first(n_block), da(n_block)
     real(wp) :: g3, h, k, hi, modulus, modulus_left, residual, square, floor_strength, lowest
     real(wp) :: strength, r, f, room, bb, bn, linear, rest, reach, over, under, left
-    real(wp) :: square_or_tiny, one_over_k, edge, no_bound, no_floor
+    real(wp) :: square_or_tiny, one_over_k, edge, no_bound, no_floor, softening, least
     integer  :: i
 
     g3 = 3.0_wp * material%shear_modulus
@@ -178,11 +178,12 @@ contains
     one_over_k = 0.0_wp
     if (k > 0.0_wp) one_over_k = 1.0_wp / k
     no_floor = merge(0.0_wp, far, k > 0.0_wp)
-    square_or_tiny = merge(square, tiny_modulus, square > 0.0_wp)
+    square_or_tiny = merge(square, tiny_square, square > 0.0_wp)
+    softening = merge(max(h, k), far, max(h, k) > 0.0_wp)
     no_bound = merge(0.0_wp, far, h > 0.0_wp)
     edge = merge(no_bound, far, square > 0.0_wp)
     !$omp simd simdlen(8) private(strength, r, f, room, bb, bn, linear, rest, reach, over, under) &
-    !$omp private(left, lowest)
+    !$omp private(left, lowest, least)
     do i = 1, n
       lowest = min(floor_strength, points%yield_stress(i))
       strength = max(lowest, points%yield_stress(i) + hi * points%alpha(i))
@@ -200,7 +201,9 @@ contains
       reach = sqrt(max(0.0_wp, linear**2 + square * rest)) + abs(linear)
       ! linear > 0: reach / square, else rest / reach; 0 / 0: on the bound and about to leave it
       over = merge(reach, rest, linear > 0.0_wp)
-      under = merge(square_or_tiny, max(reach, tiny_modulus), linear > 0.0_wp)
+      ! small beside the products of stresses in `reach`, in whatever unit
+      least = tiny_square * min(1.0_wp, softening * points%yield_stress(i))
+      under = merge(square_or_tiny, max(reach, least), linear > 0.0_wp)
       room = min(room, over / under + merge(no_bound, edge, reach > 0.0_wp))
       da(i) = f / modulus
       first(i) = min(da(i), room)

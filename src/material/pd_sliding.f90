@@ -39,7 +39,7 @@ module pd_sliding
   real(wp), parameter :: root_3_2 = sqrt(1.5_wp), root_2_3 = sqrt(2.0_wp / 3.0_wp)
   real(wp), parameter :: close = 1.0e-9_wp       !! the error after such a step is of its square
   integer,  parameter :: most_trials = 100   !! bisection alone needs 53
-  real(wp), parameter :: least = 1.0e-30_wp      !! keeps quotients finite that are not used [Pa]
+  real(wp), parameter :: least = 1.0e-100_wp     !! keeps quotients finite that are not used [Pa]
 
 contains
 

@@ -5,6 +5,7 @@ module pd_record
   use pd_checkpoint, only: checkpoint_exists, checkpoint_t, read_checkpoint, remove_checkpoints, &
     write_checkpoint
   use pd_clock, only: clock_t
+  use pd_doubt_list, only: doubts_t
   use pd_errors, only: error_list_t
   use pd_files, only: prepare_folder
   use pd_frame_fields, only: frame_fields
@@ -12,25 +13,28 @@ module pd_record
   use pd_history, only: close_history, create_history, history_t, read_history, resume_history, &
     write_row
   use pd_history_columns, only: history_columns
-  use pd_input, only: compare_used, used_values
+  use pd_input, only: compare_used, same_end, used_values
   use pd_input_types, only: input_t
   use pd_kinds, only: is_set, wp
   use pd_ledger, only: ledger_t
   use pd_model, only: model_t
   use pd_observe, only: column_t, moment_at, moment_t, observation_t, observe
   use pd_progress, only: close_progress, open_progress, progress_t, say, show_progress, status_t
-  use pd_result, only: add_row, create_result, finish_result, places_t, result_exists, result_t, &
-    resume_result, write_failed_frame, write_frame, write_rows, write_tries
+  use pd_result, only: add_row, create_result, finish_result, places_t, read_end, result_exists, &
+    result_t, resume_result, write_failed_frame, write_frame, write_rows, write_tries
   use pd_run_description, only: provenance_t, run_description_t
   use pd_schedule, only: schedule_t
   use pd_state, only: state_t
   use pd_step_limit, only: step_limit_t
   use pd_tries, only: tries_t
+  use pd_trust, only: largest_of_column, quality_t, read_doubts, write_doubts, write_quality
   implicit none
   private
 
-  public :: record_t, results_in_the_way, open_record, close_record, record_row, record_frame
+  public :: record_t, results_in_the_way, look_for_end
+  public :: open_record, close_record, record_row, record_frame
   public :: record_failure, record_progress, record_line, observe_state
+  public :: record_doubts, record_quality, load_doubts, largest_reaction_before
   public :: record_tries, save_checkpoint, save_last_checkpoint, load_checkpoint
   public :: same_points, same_history
 
@@ -60,6 +64,22 @@ contains
     results_in_the_way = result_exists(stem)
     if (.not. results_in_the_way) results_in_the_way = checkpoint_exists(stem)
   end function results_in_the_way
+
+  !> Whether the result of a run is complete, and whether that is all that the input asks for: the
+  !> same run to the same end.
+  subroutine look_for_end(input, complete, same)
+    type(input_t), intent(in)  :: input
+    logical,       intent(out) :: complete, same
+    type(error_list_t) :: different
+    type(run_description_t) :: old, new
+
+    call read_end(input%run%output_dir//'/'//input%run%name//'.h5', complete, old%values)
+    same = .false.
+    if (.not. complete) return
+    new%values = used_values(input)
+    call compare_used(old%values, new%values, different)
+    same = different%count() == 0 .and. same_end(old%values, new%values)
+  end subroutine look_for_end
 
   !> Open all outputs: new ones, or those of a checkpoint (with rows in the history).
   !>
@@ -276,6 +296,52 @@ contains
 
     call say(record%progress, text, errors)
   end subroutine record_line
+
+  !> Write the doubts of the run into the result file.
+  subroutine record_doubts(record, doubts, errors)
+    type(record_t),     intent(in)    :: record
+    type(doubts_t),     intent(in)    :: doubts
+    type(error_list_t), intent(inout) :: errors
+
+    call write_doubts(record%result%path, doubts, errors)
+  end subroutine record_doubts
+
+  !> Write the quality at the end of the run into the result file.
+  subroutine record_quality(record, quality, errors)
+    type(record_t),     intent(in)    :: record
+    type(quality_t),    intent(in)    :: quality
+    type(error_list_t), intent(inout) :: errors
+
+    call write_quality(record%result%path, quality, errors)
+  end subroutine record_quality
+
+  !> The doubts that were told during the run before a checkpoint.
+  subroutine load_doubts(stem, checkpoint, doubts)
+    character(*),       intent(in)    :: stem
+    type(checkpoint_t), intent(in)    :: checkpoint
+    type(doubts_t),     intent(inout) :: doubts
+
+    call read_doubts(stem//'.h5', checkpoint%clock%step, doubts)
+  end subroutine load_doubts
+
+  !> Largest normal force of a platen in the first rows of the history [N/m]; 0 without platens.
+  subroutine largest_reaction_before(record, model, rows, largest)
+    type(record_t), intent(in)  :: record
+    type(model_t),  intent(in)  :: model
+    integer,        intent(in)  :: rows
+    real(wp),       intent(out) :: largest
+    character(1), parameter :: axes(2) = ['x', 'y']
+
+    largest = 0.0_wp
+    associate (p => model%platens, items => model%supports%items)
+      if (p%axis == 0) return
+      largest = max( &
+        largest_of_column(record%result%path, rows, items(p%first)%support%name//'_force_'// &
+        axes(p%axis)), &
+        largest_of_column(record%result%path, rows, items(p%second)%support%name//'_force_'// &
+        axes(p%axis)))
+    end associate
+  end subroutine largest_reaction_before
 
   !> Write a checkpoint of the state after a step, but first the rows of the history before it.
   subroutine save_checkpoint(model, state, ledger, clock, limit, record, errors)

@@ -12,7 +12,7 @@ module pd_result
   use pd_frame_fields, only: frame_field_t
   use pd_frames, only: copy_frame, frame_name, mark_frame, put_frame, reserve_frame, write_label
   use pd_hdf5, only: close_file, create_file, create_group, flush_file, hdf5_file_t, open_file, &
-    read_attribute, write_attribute, write_dataset
+    read_attribute, read_dataset, write_attribute, write_dataset
   use pd_kinds, only: wp
   use pd_labels, only: label_t
   use pd_model, only: model_t
@@ -32,7 +32,7 @@ module pd_result
 
   public :: places_t, result_t, bunch
   public :: create_result, resume_result, add_row, write_rows, write_frame, write_failed_frame
-  public :: write_tries, finish_result, result_exists
+  public :: write_tries, finish_result, result_exists, read_end
 
   !> Numbers of frames and rows for which a result file has space.
   type :: places_t
@@ -71,6 +71,25 @@ contains
     result_exists = any([file_exists(stem//'.h5'), file_exists(stem//'_history.csv'), &
       file_exists(stem//'_checkpoint.h5'), file_exists(stem//'_checkpoint_previous.h5')])
   end function result_exists
+
+  !> Whether a result file is that of a run that came to its end, and the values of its input as
+  !> used; a file that is not there, or cannot be read, is none.
+  subroutine read_end(path, complete, values)
+    character(*),              intent(in)  :: path
+    logical,                   intent(out) :: complete
+    character(:), allocatable, intent(out) :: values(:)
+    type(hdf5_file_t)  :: file
+    type(error_list_t) :: unheard
+    integer :: number
+
+    complete = .false.
+    if (.not. file_exists(path)) return
+    call open_file(file, path, .false., unheard)
+    call read_attribute(file, '/', 'complete', number, unheard)
+    call read_dataset(file, '/input/values', values, unheard)
+    call close_file(file, unheard)
+    complete = number == 1 .and. unheard%count() == 0
+  end subroutine read_end
 
   !> Create the result file with space for frames and rows, replacing one of that name.
   !>

@@ -9,6 +9,7 @@ module pd_run_description
   use pd_observe, only: column_t
   use pd_system, only: host_name, process_number
   use pd_text, only: integer_text
+  use pd_trust, only: reserve_trust
   implicit none
   private
 
@@ -57,6 +58,7 @@ contains
     call write_provenance(file, description%provenance, errors)
     call write_attributes(file, description, n_frames, errors)
     call write_points(file, description, errors)
+    call reserve_trust(file, errors)
   end subroutine write_description
 
   subroutine write_provenance(file, provenance, errors)

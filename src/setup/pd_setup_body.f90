@@ -1,6 +1,7 @@
 !> From checked input to the body: its points, their volumes, and the boundaries they belong to.
 module pd_setup_body
   use pd_cloud, only: read_cloud
+  use pd_doubt_list, only: doubts_t, is_doubtful
   use pd_errors, only: error_list_t
   use pd_geometry, only: body_t, lattice_t, layer_t, nearest_count, region_body, shape_t
   use pd_input, only: resolved_path
@@ -8,7 +9,7 @@ module pd_setup_body
   use pd_input_types, only: body_input_t, input_t
   use pd_kinds, only: is_set, wp
   use pd_random_field, only: longest_way
-  use pd_text, only: short_number
+  use pd_text, only: coordinate_text, number_text, short_number
   implicit none
   private
 
@@ -20,35 +21,39 @@ contains
   !>
   !> Errors: a cloud file that is wrong; a body or a boundary without points, a hole without
   !> effect; a weak patch that holds no point.
-  subroutine set_up_body(input, body, warnings, input_errors, errors)
+  subroutine set_up_body(input, body, doubts, input_errors, errors)
     type(input_t),      intent(in)    :: input
     type(body_t),       intent(out)   :: body
-    type(error_list_t), intent(inout) :: warnings
+    type(doubts_t),     intent(inout) :: doubts
     type(error_list_t), intent(inout) :: input_errors   !! of a cloud file
     type(error_list_t), intent(inout) :: errors         !! of the model
 
     if (input%bodies(1)%shape == 'file') then
       call cloud_body(input, body, input_errors, errors)
     else
-      call shaped_body(input, body, warnings, errors)
+      call shaped_body(input, body, doubts, errors)
     end if
     if (errors%count() + input_errors%count() == 0) call look_at_patch(input, body, errors)
     if (is_set(input%random_field%correlation_length) .and. allocated(body%position)) &
       call look_at_scales(input%random_field%correlation_length, input%discretisation%spacing, &
-      maxval(abs(body%position)), warnings, errors)
+      maxval(abs(body%position)), doubts, errors)
   end subroutine set_up_body
 
   !> Check that the points can resolve a random field, and that it can be computed.
-  subroutine look_at_scales(correlation_length, spacing, farthest, warnings, errors)
+  subroutine look_at_scales(correlation_length, spacing, farthest, doubts, errors)
     real(wp),           intent(in)    :: correlation_length, spacing   !! [m]
     real(wp),           intent(in)    :: farthest                      !! largest coordinate [m]
-    type(error_list_t), intent(inout) :: warnings, errors
+    type(doubts_t),     intent(inout) :: doubts
+    type(error_list_t), intent(inout) :: errors
     character(*), parameter :: where = '&random_field correlation_length'
+    real(wp),     parameter :: round_off = 1.0e-9_wp
 
     if (farthest > longest_way * correlation_length) then
       call errors%add('the coordinates are more than 1e8 correlation lengths', where)
-    else if (correlation_length < 2.0_wp * spacing) then
-      call warnings%add('less than 2 spacings: the points cannot show how the soil varies', where)
+    else if (is_doubtful('field_resolution', correlation_length / spacing * (1.0_wp + round_off))) &
+      then
+      call doubts%add('field_resolution', correlation_length / spacing, &
+        'less than 2 spacings: the points cannot show how the soil varies', where)
     end if
   end subroutine look_at_scales
 
@@ -102,8 +107,8 @@ contains
       end do
       if (.not. any(in_patch .and. counts)) call errors%add( &
         'the weak patch holds no point of the body that can yield', '&imperfection', &
-        short_number(flaw%radius)//' m about '//short_number(flaw%x)//', '// &
-        short_number(flaw%y), 'a patch in the body, wider than the spacing')
+        short_number(flaw%radius)//' m about '//number_text(flaw%x)//', '//number_text(flaw%y), &
+        'a patch in the body, wider than the spacing')
     end associate
   end subroutine look_at_patch
 
@@ -132,16 +137,16 @@ contains
 
   !> Body from rectangles, polygons and circles on one lattice, which starts at the lower left
   !> corner of the first one, or of the box around it.
-  subroutine shaped_body(input, body, warnings, errors)
+  subroutine shaped_body(input, body, doubts, errors)
     type(input_t),      intent(in)    :: input
     type(body_t),       intent(out)   :: body
-    type(error_list_t), intent(inout) :: warnings, errors
+    type(doubts_t),     intent(inout) :: doubts
+    type(error_list_t), intent(inout) :: errors
     type(shape_t)   :: shapes(size(input%bodies))
     type(layer_t)   :: layers(size(input%boundaries))
     type(lattice_t) :: lattice
     real(wp) :: origin(2), upper(2)
     logical  :: adjusted, known
-    character(120) :: text
     integer :: k
 
     associate (d => input%discretisation)
@@ -167,9 +172,12 @@ contains
     end do
     call region_body(shapes, origin, lattice, layers, body, errors)
     if (adjusted .and. errors%count() == 0) then
-      write (text, '(a,4(g0.8,a))') 'the body is adjusted to the spacing: x from ', body%lower(1), &
-        ' to ', body%upper(1), ' m, y from ', body%lower(2), ' to ', body%upper(2), ' m'
-      call warnings%add(trim(text), '&body')
+      associate (dx => lattice%spacing)
+        call doubts%add('body_adjusted', 0.0_wp, 'the body is adjusted to the spacing: x from '// &
+          coordinate_text(body%lower(1), dx)//' to '//coordinate_text(body%upper(1), dx)// &
+          ' m, y from '//coordinate_text(body%lower(2), dx)//' to '// &
+          coordinate_text(body%upper(2), dx)//' m', '&body')
+      end associate
     end if
   end subroutine shaped_body
 

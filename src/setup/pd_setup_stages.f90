@@ -4,6 +4,7 @@
 !> between them. All have the rows of the fields in common, so that a state goes on from one stage
 !> to the next.
 module pd_setup_stages
+  use pd_doubt_list, only: doubts_t
   use pd_errors, only: error_list_t
   use pd_geometry, only: body_t
   use pd_input_types, only: body_input_t, boundary_input_t, input_t
@@ -23,18 +24,19 @@ contains
   !>
   !> `whole`: the points of all stages; n = 0: there are no stages, or they are not known yet.
   !> Errors: those of `set_up_body`.
-  subroutine set_up_stage_body(input, stage, whole, body, warnings, input_errors, errors)
+  subroutine set_up_stage_body(input, stage, whole, body, doubts, input_errors, errors)
     type(input_t),      intent(in)    :: input
     type(stage_t),      intent(in)    :: stage
     type(body_t),       intent(in)    :: whole
     type(body_t),       intent(out)   :: body
-    type(error_list_t), intent(inout) :: warnings, input_errors, errors
+    type(doubts_t),     intent(inout) :: doubts
+    type(error_list_t), intent(inout) :: input_errors, errors
     type(input_t) :: present
     integer, allocatable :: bodies(:), boundaries(:)
     integer :: before, i
 
     if (stage%name == '') then
-      call set_up_body(input, body, warnings, input_errors, errors)
+      call set_up_body(input, body, doubts, input_errors, errors)
       return
     end if
     present = input
@@ -46,7 +48,7 @@ contains
     if (size(bodies) == 0) then
       call errors%add('a stage has no body', '&stage name = '//stage%name)
     else
-      call set_up_body(present, body, warnings, input_errors, errors)
+      call set_up_body(present, body, doubts, input_errors, errors)
     end if
     if (errors%count() > before) then
       call errors%add('that is in the stage '''//stage%name//'''')
@@ -93,7 +95,7 @@ contains
     type(stage_t),      intent(in)    :: stages(:)
     type(body_t),       intent(out)   :: whole
     type(error_list_t), intent(inout) :: input_errors, errors
-    type(error_list_t) :: unheard
+    type(doubts_t) :: unheard
     type(body_t) :: bodies(size(stages)), none
     integer, allocatable :: owner(:, :), part(:, :)
     real(wp), allocatable :: volume(:, :), position(:, :, :)

@@ -56,6 +56,7 @@ MISTAKES = {
     "no residual strength": (", residual_strength = 15.0e3", "", "residual_strength: the key is"),
     "two ends": ("final_strain", "end_time = 1, final_strain", "end of the run is given twice"),
     "platens apart": ("-0.01", "0.01", "the platens do not approach each other"),
+    "strain in per cent": ("strain = 0.001", "strain = 1.6", "found: 1.6; allowed: > 0 and < 1"),
     "no platens": ("side = 'top'", "side = 'left'", "the key needs platens, and there are none"),
     "frame beyond the end": ("0.0005, 0.001", "0.002", "a frame beyond the end of the run"),
     "field without variation": (

@@ -3,7 +3,7 @@
 import h5py
 import numpy as np
 import pytest
-from case_files import SPECIMEN, changed
+from case_files import SPECIMEN, changed, history
 
 # Two layers of 1 m between smooth walls, the upper one twice as stiff, under a load on top.
 LOAD, LOWER, UPPER = 20.0e3, (25.0e6, 0.2), (50.0e6, 0.3)
@@ -169,3 +169,23 @@ def test_bands_that_form_do_not_count_as_flow_that_turns_back(run_case, tmp_path
     done = run_case(text, tmp_path, "--quiet")
     assert done.returncode == 0, done.stderr
     assert TURNS_BACK not in (tmp_path / "out" / "case.log").read_text()
+
+
+@pytest.mark.parametrize("moduli", [(-1.5e6, 0.0), (-1.0e6, -0.5e6)])
+def test_plasticity_knows_no_unit_of_stress(run_case, tmp_path, moduli):
+    ends = []
+    for unit in (1.0, 1.0e-26):  # of stress, and of density and damping with it
+        kinematic, isotropic = (repr(unit * modulus) for modulus in moduli)
+        text = changed(
+            SPECIMEN,
+            density=repr(unit * 2000.0),
+            youngs_modulus=repr(unit * 50.0e6),
+            yield_stress=repr(unit * 0.15e6),
+            kinematic_modulus=f"{kinematic}, isotropic_modulus = {isotropic}",
+            residual_strength=repr(unit * 15.0e3),
+            damping=repr(unit * 5.0e5),
+        )
+        assert run_case(text, tmp_path, "--quiet", "--force").returncode == 0
+        rows = history(tmp_path / "out" / "case_history.csv")
+        ends.append((rows["max_plastic_strain"][-1], rows["top_force_y"][-1] / unit))
+    assert ends[0] == pytest.approx(ends[1], rel=1e-9)

@@ -281,6 +281,38 @@ def test_a_checkpoint_of_laws_that_remember_less_is_refused(run_case, tmp_path):
         del file["state/history"]
         file["state/history"] = history[:, :4]
     sealed(path)
+    text = text.replace("final_strain = 0.01", "final_strain = 0.011")
     done = run_case(text, tmp_path, "--quiet", "--restart")
     assert done.returncode == 5
     assert "the laws remember something else than in the checkpoint" in done.stderr
+
+
+def test_a_finished_run_is_not_computed_again(program, run_case, tmp_path):
+    # interrupted once, and then finished: the checkpoint of the interruption is still there
+    text = LONG.replace(END, "final_strain = 0.02")
+    assert stop(begin(program, tmp_path, text), signal.SIGTERM, tmp_path, 60) == 143
+    assert run_case(text, tmp_path, "--restart", "--quiet").returncode == 0
+    before = contents(tmp_path / "out")
+    done = run_case(text, tmp_path, "--restart")
+    assert done.returncode == 0
+    assert done.stdout == (
+        "the run is finished: out/case.h5 is complete; a later end goes on from a checkpoint, "
+        "--force begins anew\n"
+    )
+    assert run_case(text, tmp_path, "--restart", "--quiet").stdout == ""
+    assert contents(tmp_path / "out") == before
+    # another model is refused as before
+    done = run_case(text.replace("50.0e6", "51.0e6"), tmp_path, "--restart")
+    assert done.returncode == 2
+    assert "youngs_modulus" in done.stderr
+    later = text.replace("0.02", "0.021")
+    assert run_case(later, tmp_path, "--restart", "--quiet").returncode == 0
+    assert history(tmp_path / "out" / "case_history.csv")["strain"][-1] >= 0.021
+
+
+def test_a_finished_run_without_a_state_says_so(run_case, tmp_path):
+    assert run_case(SPECIMEN, tmp_path, "--quiet").returncode == 0
+    later = SPECIMEN.replace("final_strain = 0.01", "final_strain = 0.011")
+    done = run_case(later, tmp_path, "--restart")
+    assert done.returncode == 5
+    assert "the run is finished, and no state was kept" in done.stderr

@@ -1,6 +1,7 @@
 !> Models from the texts of input files, for the suites of what reads and translates them.
 module models
   use pd_clock, only: clock_t
+  use pd_doubt_list, only: doubts_t
   use pd_errors, only: error_list_t
   use pd_input, only: read_input
   use pd_input_types, only: input_t
@@ -36,7 +37,8 @@ module models
     type(model_t)    :: model
     type(schedule_t) :: schedule
     type(clock_t)    :: clock
-    type(error_list_t) :: warnings, errors
+    type(doubts_t) :: doubts
+    type(error_list_t) :: errors
   end type made_t
 
 contains
@@ -54,7 +56,7 @@ contains
     close (unit)
     call read_input('case.nml', made%input, made%errors)
     if (made%errors%count() > 0) return
-    call set_up_body(made%input, made%model%body, made%warnings, made%errors, made%errors)
+    call set_up_body(made%input, made%model%body, made%doubts, made%errors, made%errors)
     if (made%errors%count() > 0) return
     call set_up_model(made%input, made%model, made%errors)
     if (made%errors%count() > 0) return

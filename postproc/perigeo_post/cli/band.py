@@ -105,5 +105,10 @@ def _band_text(m: BandMeasure) -> str:
                 f"{band.angle_uncertainty:.1f} degrees from the loading axis ({b.axis}), from "
                 f"({x0:.3g}, {y0:.3g}) to ({x1:.3g}, {y1:.3g}) m, strength {band.strength:.4g}"
             )
+    if m.resolved is False:
+        lines.append(
+            f"  warning: the band is narrower than the horizon, {m.horizon:.4g} m: no model "
+            "of this horizon can show it; zero-energy modes, or one row of points, may look so"
+        )
     lines.append(f"  weaker over stronger {b.ratio:.3f}, largest plastic strain {m.largest:.4g}")
     return "\n".join(lines)

@@ -74,8 +74,26 @@ def _info_text(facts: dict[str, Any]) -> str:
         borne, not_borne = facts["factor_of_safety"].values()
         rest = f", {not_borne:.4g} is not" if np.isfinite(not_borne) else ", and none was not"
         lines.append(f"  safety       a factor of {borne:.4g} is borne{rest}")
+    lines += _trust_text(facts)
     lines += [f"  {key:<14} {value}" for key, value in facts["provenance"].items()]
     return "\n".join(lines)
+
+
+def _trust_text(facts: dict[str, Any]) -> list[str]:
+    """Doubts that were told, the frames that come after one, and the quality at the end."""
+    lines = []
+    for doubt in facts["doubts"]:
+        found = f"{doubt['value']:.4g} ({doubt['bound']}): " if doubt["bound"] else ""
+        when = f"step {doubt['step']}" if doubt["step"] else "the start"
+        lines.append(f"  warning      {doubt['name']} at {when}: {found}{doubt['meaning']}")
+    first = min((d["step"] for d in facts["doubts"] if d["step"]), default=None)
+    if first is not None:
+        after = [f for f in facts["frames"] if f["valid"] and f["step"] >= first]
+        lines.append(f"               {len(after)} of the frames come at or after step {first}")
+    if facts["quality"]:
+        words = ", ".join(f"{key} {value:.3g}" for key, value in facts["quality"].items())
+        lines.append(f"  quality      {words}")
+    return lines
 
 
 def _fields_text(facts: dict[str, Any]) -> list[str]:

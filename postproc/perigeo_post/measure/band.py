@@ -24,6 +24,7 @@ Definitions (the README of this package has them in words):
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -257,6 +258,13 @@ class BandMeasure(Short):
         return self.widths[0].width
 
     @property
+    def resolved(self) -> bool | None:
+        """Whether the width is at least the horizon, which bounds it; None where not known."""
+        if not (math.isfinite(self.width) and math.isfinite(self.horizon)):
+            return None
+        return self.width >= self.horizon
+
+    @property
     def interpolated_normal(self) -> float:
         """The interpolated width, turned from the line to right angles to the band [m]."""
         angle = crossing_angle(self.profile.line, self.bands.prevailing.line)
@@ -273,6 +281,7 @@ class BandMeasure(Short):
             "width": self.width,
             "width_spread": self.widths[0].spread,
             "width_places": self.widths[0].places,
+            "resolved": self.resolved,
             "width_interpolated": self.interpolated.width,
             "width_interpolated_uncertainty": self.interpolated.uncertainty,
             "width_interpolated_closed": self.interpolated.closed,

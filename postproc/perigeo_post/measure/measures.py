@@ -11,6 +11,7 @@ import numpy as np
 from ..read.errors import FieldNotFoundError, PostError, RequestError
 from ..read.points import FloatArray, PointSet
 from ..read.run import Frame, Run
+from ..read.trust import doubts_of, quality_of
 from .band import (
     LEVEL,
     BandMeasure,
@@ -243,6 +244,8 @@ def run_facts(run: Run) -> dict[str, Any]:
     safety = run.factor_of_safety
     if safety:
         facts["factor_of_safety"] = {"borne": safety[0], "not_borne": safety[1]}
+    facts["doubts"] = [asdict(one) | {"bound": one.bound} for one in doubts_of(run.path)]
+    facts["quality"] = quality_of(run.path)
     facts["history"] = _history_facts(run)
     return facts
 
