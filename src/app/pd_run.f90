@@ -1,11 +1,12 @@
 !> A run: what it consists of, and how it begins.
 module pd_run
   use, intrinsic :: iso_fortran_env, only: compiler_version, int64
-  use omp_lib, only: omp_get_max_threads
+  use omp_lib, only: omp_get_max_threads, omp_get_num_procs
   use pd_body_force, only: body_force_t, new_body_force
   use pd_checkpoint, only: checkpoint_t
   use pd_clock, only: clock_t
   use pd_command_line, only: options_t
+  use pd_division, only: divide_model
   use pd_errors, only: error_list_t, exit_file, exit_input, exit_model, outcome_t
   use pd_history_columns, only: history_columns
   use pd_increment, only: begin_increments, increments_t, new_increments
@@ -15,6 +16,7 @@ module pd_run
   use pd_ledger, only: ledger_t, new_ledger
   use pd_model, only: model_t, release_set_up, start
   use pd_observe, only: column_t, moment_at, observation_t, observe
+  use pd_ranks, only: ranks_t
   use pd_record, only: load_checkpoint, observe_state, open_record, record_frame, record_line, &
     record_progress, record_row, record_t, results_in_the_way, same_history, same_points
   use pd_reversal, only: new_reversal, reversal_t
@@ -28,16 +30,19 @@ module pd_run
   use pd_step, only: step_work_t
   use pd_step_limit, only: new_step_limit, step_limit_t
   use pd_summary, only: summarise, summary_t
+  use pd_system, only: pending_signal
   use pd_tables, only: new_table
+  use pd_text, only: integer_text
   use pd_timing, only: timing_t
   use pd_version, only: build_flags, code_version, git_hash
   implicit none
   private
 
   public :: run_t, set_up_run, open_outputs, start_increments, add_release
-  public :: keep_standing_load
+  public :: keep_standing_load, signal_of
 
   type :: run_t
+    type(ranks_t)      :: ranks               !! that share it
     type(input_t)      :: input
     type(stage_t), allocatable :: stages(:)
     type(model_t)      :: model
@@ -64,6 +69,16 @@ module pd_run
   end type run_t
 
 contains
+
+  !> The signal that any rank has received, 0: none.
+  integer function signal_of(run) result(signal)
+    type(run_t), intent(in) :: run
+    integer :: found(1)
+
+    found = pending_signal()
+    call run%ranks%largest_numbers(found)
+    signal = found(1)
+  end function signal_of
 
   !> Input, body, model, time step, and the state to begin with: unloaded, or of a checkpoint.
   subroutine set_up_run(options, run, outcome)
@@ -97,12 +112,18 @@ contains
     if (outcome%done) return
     call keep_standing_load(run, run%stages(run%checkpoint%clock%stage), run%model)
     call look_at_model(run)
+    call look_at_cores(run)
     if (run%checkpoint%history_rows > 0) then
       if (.not. same_history(run%state, run%model)) &
         call errors%add('the laws remember something else than in the checkpoint', run%input%path, &
         allowed='the version of perigeo that wrote it, or --force for a new run')
       call outcome%end_if_any(errors, exit_file)
       if (outcome%done) return
+    end if
+    if (.not. options%check) then
+      call outcome%agree(run%ranks)
+      if (outcome%done) return
+      call divide_model(run%ranks, run%model)
     end if
     run%clock = run%checkpoint%clock
     run%limit = run%checkpoint%limit
@@ -172,6 +193,7 @@ contains
     release = new_body_force('release', -state%released, model%points%volume, 0.0_wp, &
       [0.0_wp, 0.0_wp], 'what the stage has changed')
     release%factor = new_table([stage%start_time, stage%end_time], [1.0_wp, 0.0_wp], 0.0_wp)
+    call release%divide(model%blocks)
     call model%loads%append(release)
     model%releases = .true.
   end subroutine add_release
@@ -220,6 +242,19 @@ contains
       end associate
     end do
   end subroutine look_at_model
+
+  !> Warn of threads that share the cores that mpirun has given a rank.
+  subroutine look_at_cores(run)
+    type(run_t), intent(inout) :: run
+    integer :: threads, cores
+
+    threads = omp_get_max_threads()
+    cores = omp_get_num_procs()
+    if (run%ranks%count == 1 .or. threads <= cores) return
+    call run%warnings%add(integer_text(threads)//' threads of a rank share '// &
+      integer_text(cores)//' of the cores; mpirun --map-by slot:PE=N gives each rank N of them', &
+      '--threads')
+  end subroutine look_at_cores
 
   !> Warn of ground under horizontal stress that nothing bears but the load that holds it.
   subroutine look_at_ground(run)
@@ -334,6 +369,7 @@ contains
       build_flags, command, omp_get_max_threads()), run%model, run%schedule, run%checkpoint, &
       options%quiet, run%record, errors)
     call outcome%end_if_any(errors, exit_file)
+    call outcome%agree(run%ranks)
     if (outcome%done) return
     associate (record => run%record)
       call record_line(record, 'perigeo '//code_version//' ('//git_hash//'), '// &
@@ -348,7 +384,10 @@ contains
       call observe_state(run%model, run%state, run%ledger, run%clock, record)
       if (run%checkpoint%history_rows == 0) then
         call record_row(record, errors)
-        if (errors%count() == 0) call record_frame(run%model, run%state, record, errors)
+        call outcome%end_if_any(errors, exit_file)
+        call outcome%agree(run%ranks)
+        if (outcome%done) return
+        call record_frame(run%model, run%state, record, errors)
       else
         call record_line(record, 'going on from a checkpoint', errors)
       end if

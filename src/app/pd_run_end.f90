@@ -76,10 +76,13 @@ contains
   end function stage_in_words
 
   !> The row that moves fastest among those that are free: where a run fails that gains energy.
-  pure integer function fastest_row(run)
+  integer function fastest_row(run)
     type(run_t), intent(in) :: run
+    real(wp), allocatable :: velocity(:, :)
 
-    fastest_row = maxloc(sum((run%model%points%free * run%state%velocity)**2, dim=2), dim=1)
+    allocate (velocity, source=run%state%velocity)
+    call run%model%blocks%spread_rows(velocity)
+    fastest_row = maxloc(sum((run%model%points%free * velocity)**2, dim=2), dim=1)
   end function fastest_row
 
   !> What mends a balance.

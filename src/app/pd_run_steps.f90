@@ -21,6 +21,8 @@ module pd_run_steps
   type :: due_t
     logical :: row = .false., frame = .false., checkpoint = .false.
     logical :: stop = .false.      !! a signal came
+    integer :: signal = 0          !! its number
+    logical :: progress = .false.  !! is shown
     logical :: anything = .false.  !! something is written: the state will be observed
     logical :: whole = .false.     !! the state will be looked at
   end type due_t
@@ -28,22 +30,30 @@ module pd_run_steps
 contains
 
   !> What is due after a step. A signal that comes during a step takes effect after the next one.
+  !> Clocks and signals differ from rank to rank: what one of them finds due is due.
   type(due_t) function due_after_step(step, run) result(due)
     integer,     intent(in) :: step
     type(run_t), intent(in) :: run
     integer(int64) :: now, rate
+    integer :: found(3)
 
     due%row = run%schedule%row_due(step)
     due%frame = run%schedule%frames_due(step) > 0
-    due%stop = pending_signal() /= 0
-    due%checkpoint = due%stop
+    if (.not. run%record%elsewhere) &
+      due%progress = progress_due(run%record%progress, step, run%schedule%steps)
     associate (every => run%input%output%checkpoint_every)
       if (every > 0.0_wp) then
         call system_clock(now, rate)
-        due%checkpoint = due%checkpoint .or. step == run%schedule%steps .or. &
+        due%checkpoint = step == run%schedule%steps .or. &
           real(now - run%last_checkpoint, wp) >= every * real(rate, wp)
       end if
     end associate
+    found = [pending_signal(), merge(1, 0, due%checkpoint), merge(1, 0, due%progress)]
+    call run%ranks%largest_numbers(found)
+    due%signal = found(1)
+    due%stop = due%signal /= 0
+    due%checkpoint = due%stop .or. found(2) > 0
+    due%progress = found(3) > 0
     due%anything = due%row .or. due%frame .or. due%checkpoint
     due%whole = due%anything .or. run%limit%look_due(step)
   end function due_after_step
@@ -68,7 +78,7 @@ contains
       if (outcome%done) return
     end if
     if (due%row) call record_row(run%record, errors)
-    if (progress_due(run%record%progress, run%clock%step, run%schedule%steps)) &
+    if (due%progress) &
       call record_progress(run%model, run%state, run%schedule, run%clock, run%record, errors)
     call run%timing%lap(kernel_history)
     call write_frames_and_checkpoint(due, run, errors)
@@ -76,7 +86,7 @@ contains
       'stopped by a signal; --restart goes on from the checkpoint', errors)
     call outcome%end_if_any(errors, exit_file)
     if (due%stop .and. .not. outcome%done) &
-      call outcome%end_with(merge(exit_interrupted, exit_terminated, pending_signal() == sigint))
+      call outcome%end_with(merge(exit_interrupted, exit_terminated, due%signal == sigint))
   end subroutine write_what_is_due
 
   !> Write the frames that are due at this step, and a checkpoint.

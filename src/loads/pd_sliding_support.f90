@@ -22,6 +22,7 @@ module pd_sliding_support
                                                        !! (most in a column, columns)
   contains
     procedure :: share_forces
+    procedure :: mark_read
   end type sliding_support_t
 
 contains
@@ -57,5 +58,14 @@ contains
       end associate
     end do
   end subroutine share_forces
+
+  !> Points of the body belong to the columns, too.
+  pure subroutine mark_read(self, marked)
+    class(sliding_support_t), intent(in)    :: self
+    logical,                  intent(inout) :: marked(:)
+
+    marked(self%points) = .true.
+    marked(pack(self%columns, self%columns > 0)) = .true.
+  end subroutine mark_read
 
 end module pd_sliding_support

@@ -8,6 +8,7 @@ module pd_model
   use pd_operators, only: operators_t
   use pd_platens, only: platens_t, reference_ends
   use pd_points, only: points_t, probe_t
+  use pd_shared_rows, only: shared_rows_t
   use pd_state, only: state_t
   use pd_storage, only: storage_t
   use pd_supports, only: supports_t
@@ -32,7 +33,9 @@ module pd_model
     type(storage_t)   :: shown               !! rows of the points that results show
     class(operators_t), allocatable :: operators
     type(materials_t) :: materials
-    type(blocks_t)    :: blocks              !! of the rows of all fields
+    type(blocks_t)    :: blocks              !! of the rows of all fields; those of this rank
+    type(shared_rows_t) :: shared            !! rows that supports and loads look at
+    type(shared_rows_t) :: probed            !! those of the probes
     type(points_t)    :: points
     type(platens_t)   :: platens
     type(supports_t)  :: supports
@@ -110,6 +113,7 @@ contains
     end do
     call model%supports%prescribe(0.0_wp, state%displacement, state%velocity)
     call model%loads%add_forces(model%points%volume, 0.0_wp, state%force)
+    call model%shared%bring(state%force)
     call model%supports%share_forces(model%points%volume, 0.0_wp, state%force)
     if (allocated(model%initial)) &   ! the body leans on them from the start
       call model%supports%take_reactions(model%points%volume, 0.0_wp, state%force)

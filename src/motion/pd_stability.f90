@@ -91,12 +91,12 @@ contains
       call scatter(model%points%volume, free, q)
       off_diagonal(0) = 0.0_wp
       ritz = 0.0_wp
-      call scale_to(1.0_wp / sqrt(product_of(blocks, mass, q, q, free)), q)
+      call scale_to(1.0_wp / sqrt(product_of(blocks, mass, q, q, free)), blocks, q)
       do k = 1, most_iterations
         iterations = k
         call linear_forces(model%operators, model%materials, q, h, r, state, next)
         diagonal(k) = -product_of(blocks, volume, q, r, free) / reference
-        call combine(density, free, r, -diagonal(k), q, -off_diagonal(k - 1), q_old)
+        call combine(blocks, density, free, r, -diagonal(k), q, -off_diagonal(k - 1), q_old)
         off_diagonal(k) = sqrt(product_of(blocks, mass, r, r, free))
         ritz(k) = largest_eigenvalue(diagonal(:k), off_diagonal(1:k - 1))
         if (ritz(k) - ritz(max(0, k - look_back)) <= tolerance * ritz(k)) exit
@@ -105,7 +105,7 @@ contains
         call move_alloc(q, q_old)
         call move_alloc(r, q)
         call move_alloc(spare, r)
-        call scale_to(1.0_wp / off_diagonal(k), q)
+        call scale_to(1.0_wp / off_diagonal(k), blocks, q)
       end do
     end associate
     frequency = sqrt(max(0.0_wp, ritz(iterations) &
@@ -131,13 +131,14 @@ contains
   end subroutine scatter
 
   !> q <- factor q.
-  subroutine scale_to(factor, q)
-    real(wp), intent(in) :: factor
+  subroutine scale_to(factor, blocks, q)
+    real(wp),       intent(in) :: factor
+    type(blocks_t), intent(in) :: blocks
     real(wp), intent(inout), contiguous :: q(:, :)
     integer :: i
 
-    !$omp parallel do schedule(static) default(none) shared(factor, q) private(i)
-    do i = 1, size(q, 1)
+    !$omp parallel do schedule(static) default(none) shared(factor, blocks, q) private(i)
+    do i = blocks%first, blocks%last
       q(i, 1) = factor * q(i, 1)
       q(i, 2) = factor * q(i, 2)
     end do
@@ -145,7 +146,8 @@ contains
   end subroutine scale_to
 
   !> r <- -free r / rho + b q + c p.
-  subroutine combine(density, free, r, b, q, c, p)
+  subroutine combine(blocks, density, free, r, b, q, c, p)
+    type(blocks_t), intent(in) :: blocks
     real(wp), intent(in) :: b, c
     real(wp), intent(in),    contiguous :: density(:)                     !! rho (n) [kg/m^3]
     real(wp), intent(in),    contiguous :: free(:, :), q(:, :), p(:, :)   !! (n,2)
@@ -154,8 +156,8 @@ contains
     integer  :: i
 
     !$omp parallel do schedule(static) default(none) private(i, a) &
-    !$omp shared(density, b, c, free, r, q, p)
-    do i = 1, size(q, 1)
+    !$omp shared(blocks, density, b, c, free, r, q, p)
+    do i = blocks%first, blocks%last
       a = -1.0_wp / density(i)
       r(i, 1) = a * free(i, 1) * r(i, 1) + b * q(i, 1) + c * p(i, 1)
       r(i, 2) = a * free(i, 2) * r(i, 2) + b * q(i, 2) + c * p(i, 2)

@@ -7,18 +7,14 @@
 !> H = F - I is handed out and the first Piola stress P taken in; f is minus the adjoint of H. A is
 !> the force tensor: the force state of a bond is omega A xi. c is the stiffness of the zero-energy
 !> control, whose affine part joins A. The relaxing control is in `pd_relaxing`; its sums are
-!>
 !>   S[x]_i = sum_j w~_ij (x_j - x_i)    w~_ij = omega V_j (1 - falloff |xi|^2)
-!>
 !> In this order, once per state of u:
-!>
 !>   take_in(u)                          the sums can read u
 !>   gradient_block(lo, hi, u, h)        for every block
 !>   relax_block(block, u, h, ..., p)    for every block; the relaxing control joins P
 !>   hand_over_block(lo, hi, h, p)       for every block; takes P, keeps A
 !>   share()                             the sums can read A
 !>   force_block(lo, hi, u, f)           for every block
-!>
 !> Realisations: `pd_bond_list` for any points, `pd_balanced_list` off lattices, `pd_lattice` on
 !> them. Set-up chooses; nothing else knows which. Each provides the sums G, D, Z and S. Where its
 !> weights leave out the volume of the neighbour, fields are first multiplied by its share. Families
@@ -66,6 +62,7 @@ module pd_operators
     procedure :: control_energy
     procedure :: set_relaxing
     procedure :: relaxing_energy
+    procedure :: needed_rows
     procedure, private :: residual_sums
     procedure, private :: weigh_in
     procedure, private :: weigh_block
@@ -172,8 +169,8 @@ contains
     real(wp), intent(in), contiguous :: u(:, :)   !! (n,2) [m]
     integer :: i, first, last
 
-    first = self%domain%blocks%first
-    last = self%domain%blocks%last
+    first = self%domain%known(1)
+    last = self%domain%known(2)
     if (self%weighs) then
       if (.not. allocated(self%weighed)) allocate (self%weighed(self%n, 2), source=0.0_wp)
       !$omp parallel do simd schedule(static) default(none) shared(self, u, first, last) private(i)
@@ -440,5 +437,14 @@ contains
     end associate
     energy = block_sum(terms)
   end function control_energy_of_block
+
+  !> Rows that the families of rows `first` to `last` read, ascending; none for no rows.
+  pure function needed_rows(self, first, last) result(rows)
+    class(operators_t), intent(in) :: self
+    integer, intent(in)  :: first, last
+    integer, allocatable :: rows(:)
+
+    rows = self%storage%around(first, last, self%domain%blocks%ends)
+  end function needed_rows
 
 end module pd_operators

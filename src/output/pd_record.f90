@@ -5,6 +5,7 @@ module pd_record
   use pd_checkpoint, only: checkpoint_exists, checkpoint_t, read_checkpoint, remove_checkpoints, &
     write_checkpoint
   use pd_clock, only: clock_t
+  use pd_division, only: bring_looked_at
   use pd_errors, only: error_list_t
   use pd_files, only: prepare_folder
   use pd_frame_fields, only: frame_fields
@@ -18,8 +19,8 @@ module pd_record
   use pd_model, only: model_t
   use pd_observe, only: column_t, moment_at, moment_t, observation_t, observe
   use pd_progress, only: close_progress, open_progress, progress_t, say, show_progress, status_t
-  use pd_result, only: add_row, create_result, finish_result, places_t, result_exists, result_t, &
-    resume_result, write_failed_frame, write_frame, write_rows, write_tries
+  use pd_result, only: add_row, attend_result, create_result, finish_result, places_t, &
+    result_exists, result_t, resume_result, write_failed_frame, write_frame, write_rows, write_tries
   use pd_run_description, only: provenance_t, run_description_t
   use pd_schedule, only: schedule_t
   use pd_state, only: state_t
@@ -43,6 +44,7 @@ module pd_record
     type(moment_t)      :: moment                !! of the last look at the state
     type(observation_t) :: seen                  !! at this moment
     integer :: frames = 0                        !! written so far, 000000 among them
+    logical :: elsewhere = .false.               !! another rank writes
   end type record_t
 
   character(*), parameter :: ledger_names(4) = [character(24) :: 'initial_kinetic_energy', &
@@ -82,6 +84,12 @@ contains
     description%values = record%values
     description%time_step = checkpoint%clock%time_step
     record%columns = description%columns
+    record%elsewhere = model%blocks%ranks%mine > 0
+    if (record%elsewhere) then
+      call attend_result(record%result, record%stem, description, places_t())
+      record%frames = checkpoint%frames_written
+      return
+    end if
     call prepare_folder(input%run%output_dir, errors)
     if (errors%count() > 0) return
     if (restart) then
@@ -100,8 +108,9 @@ contains
       if (errors%count() == 0) &
         call create_history(record%history, record%stem, record%columns, errors)
     end if
-    if (errors%count() == 0) &
-      call open_progress(record%progress, record%stem, restart, quiet, errors)
+    ! what mpirun passes on looks like a terminal
+    if (errors%count() == 0) call open_progress(record%progress, record%stem, restart, quiet, &
+      errors, plain=model%blocks%ranks%count > 1)
   end subroutine open_record
 
   !> Everything in the result file except frames and rows.
@@ -168,6 +177,7 @@ contains
     type(record_t),     intent(inout) :: record
     type(error_list_t), intent(inout) :: errors
 
+    if (record%elsewhere) return
     call close_history(record%history, errors)
     if (errors%count() == 0) call finish_result(record%result, record%moment, errors)
     call close_progress(record%progress, errors)
@@ -175,12 +185,13 @@ contains
 
   !> Observe the state after a step; what is seen stays in the record.
   subroutine observe_state(model, state, ledger, clock, record)
-    type(model_t),  intent(in)    :: model
-    type(state_t),  intent(in)    :: state
+    type(model_t),  intent(inout) :: model
+    type(state_t),  intent(inout) :: state
     type(ledger_t), intent(in)    :: ledger
     type(clock_t),  intent(in)    :: clock
     type(record_t), intent(inout) :: record
 
+    call bring_looked_at(model, state)
     record%moment = moment_at(clock, model, state, ledger)
     call observe(record%columns, model, state, record%moment, record%seen)
   end subroutine observe_state
@@ -190,6 +201,7 @@ contains
     type(record_t),     intent(inout) :: record
     type(error_list_t), intent(inout) :: errors
 
+    if (record%elsewhere) return
     call write_row(record%history, record%seen%values, errors)
     call add_row(record%result, record%seen%values, errors)
   end subroutine record_row
@@ -211,25 +223,27 @@ contains
     type(record_t),     intent(inout) :: record
     type(error_list_t), intent(inout) :: errors
 
+    if (record%elsewhere) return
     call write_tries(record%result, tries, errors)
   end subroutine record_tries
 
   !> Write the state of a run that has failed, marked as not valid.
   subroutine record_failure(model, state, clock, record, errors)
-    type(model_t),      intent(in)    :: model
-    type(state_t),      intent(in)    :: state
+    type(model_t),      intent(inout) :: model
+    type(state_t),      intent(inout) :: state
     type(clock_t),      intent(in)    :: clock
     type(record_t),     intent(inout) :: record
     type(error_list_t), intent(inout) :: errors
 
+    call bring_looked_at(model, state)
     call write_failed_frame(record%result, moment_at(clock, model, state, ledger_t()), model, &
       state, errors)
   end subroutine record_failure
 
   !> Show the progress of the run; axial stress and largest alpha are those of the last row.
   subroutine record_progress(model, state, schedule, clock, record, errors)
-    type(model_t),      intent(in)    :: model
-    type(state_t),      intent(in)    :: state
+    type(model_t),      intent(inout) :: model
+    type(state_t),      intent(inout) :: state
     type(schedule_t),   intent(in)    :: schedule
     type(clock_t),      intent(in)    :: clock
     type(record_t),     intent(inout) :: record
@@ -237,6 +251,8 @@ contains
     type(status_t) :: status
     type(moment_t) :: moment
 
+    call bring_looked_at(model, state)
+    if (record%elsewhere) return
     status%step = clock%step
     status%steps = schedule%steps
     status%time = clock%time()
@@ -258,6 +274,7 @@ contains
     character(*),       intent(in)    :: text
     type(error_list_t), intent(inout) :: errors
 
+    if (record%elsewhere) return
     call say(record%progress, text, errors)
   end subroutine record_line
 
@@ -271,10 +288,12 @@ contains
     type(record_t),     intent(inout) :: record
     type(error_list_t), intent(inout) :: errors
     type(checkpoint_t) :: checkpoint
+    type(ledger_t) :: whole
     integer :: before
 
     before = errors%count()
-    call write_rows(record%result, errors)
+    whole = ledger%gathered(model%blocks)
+    if (.not. record%elsewhere) call write_rows(record%result, errors)
     if (errors%count() > before) return
     checkpoint%clock = clock
     checkpoint%limit = limit
@@ -283,14 +302,14 @@ contains
     checkpoint%ledger_names = ledger_names
     checkpoint%ledger = [ledger%initial_kinetic_energy, ledger%initial_strain_energy, &
       ledger%largest_work, ledger%outer_work]
-    allocate (checkpoint%ledger_blocks(size(ledger%plastic), 4))
-    checkpoint%ledger_blocks(:, 1) = ledger%plastic
-    checkpoint%ledger_blocks(:, 2) = ledger%damping
-    checkpoint%ledger_blocks(:, 3) = ledger%frame_work
-    checkpoint%ledger_blocks(:, 4) = ledger%control
+    allocate (checkpoint%ledger_blocks(size(whole%plastic), 4))
+    checkpoint%ledger_blocks(:, 1) = whole%plastic
+    checkpoint%ledger_blocks(:, 2) = whole%damping
+    checkpoint%ledger_blocks(:, 3) = whole%frame_work
+    checkpoint%ledger_blocks(:, 4) = whole%control
     checkpoint%input = record%values
     call points_of(model, checkpoint%position, checkpoint%volume, checkpoint%boundary)
-    call write_checkpoint(record%stem, checkpoint, state, model%shown%row, errors)
+    call write_checkpoint(record%stem, checkpoint, state, model%shown%row, errors, model%blocks)
   end subroutine save_checkpoint
 
   !> Read the newest checkpoint and compare its input with the present one. The state has one row

@@ -28,7 +28,8 @@ module pd_result
   private
 
   public :: places_t, result_t, bunch
-  public :: create_result, resume_result, add_row, write_rows, write_frame, write_failed_frame
+  public :: create_result, resume_result, attend_result, add_row, write_rows, write_frame
+  public :: write_failed_frame
   public :: write_tries, finish_result, result_exists
 
   !> Numbers of frames and rows for which a result file has space.
@@ -50,6 +51,7 @@ module pd_result
     type(column_t),      allocatable :: columns(:)
     logical :: has_strain = .false.    !! whether there are platens
     logical :: yields = .false.        !! whether the points have a yield stress
+    logical, private :: elsewhere = .false.   !! another rank writes it
     integer :: written = 0             !! frames written so far
     character(:), allocatable :: grids !! of these frames, for the XDMF file
     integer :: rows_written = 0
@@ -83,6 +85,17 @@ contains
     call create_structure(result, file, description, errors)
     call publish(result, file, errors)
   end subroutine create_result
+
+  !> Take part in a result file that another rank writes: hand in the fields of the frames.
+  subroutine attend_result(result, stem, description, places)
+    type(result_t),          intent(out) :: result
+    character(*),            intent(in)  :: stem
+    type(run_description_t), intent(in)  :: description
+    type(places_t),          intent(in)  :: places
+
+    call describe_result(result, stem, description, places)
+    result%elsewhere = .true.
+  end subroutine attend_result
 
   !> Go on with the result file of a run that was cut off: a new file with the first frames and rows
   !> of the old one and space for more replaces it.
@@ -198,6 +211,10 @@ contains
     integer :: before
 
     before = errors%count()
+    if (result%elsewhere) then
+      call put_frame(file, frame_name(index), result%fields, model, state, errors)
+      return
+    end if
     if (index < 0 .or. index >= result%places%frames) then
       call errors%add('there is no place for frame '//frame_name(index), where=result%path)
       return
@@ -224,6 +241,10 @@ contains
     type(error_list_t), intent(inout) :: errors
     type(hdf5_file_t) :: file
 
+    if (result%elsewhere) then
+      call put_frame(file, '/failed_frame', result%fields, model, state, errors)
+      return
+    end if
     call open_file(file, result%path, .true., errors)
     call put_waiting_rows(result, file, errors)
     call put_frame(file, '/failed_frame', result%fields, model, state, errors)

@@ -130,17 +130,20 @@ contains
     ignored = c_setenv(c_string(name), c_string(value), 0_c_int)
   end subroutine set_environment
 
-  !> From now on SIGINT and SIGTERM are only noted, for `pending_signal`. A file that exceeds a
-  !> limit (SIGXFSZ) or a closed pipe behind the screen (SIGPIPE) must not kill a run: the write
-  !> that fails reports it.
+  !> From now on SIGINT, SIGTERM and SIGUSR1 are only noted, for `pending_signal`; mpirun passes on
+  !> the last one and leaves the ranks alone with it. A file that exceeds a limit (SIGXFSZ) or a
+  !> closed pipe behind the screen (SIGPIPE) must not kill a run: the write that fails reports it.
   subroutine catch_signals()
     type(c_funptr) :: previous, ignore
+    logical :: linux
 
+    inquire (file='/proc/version', exist=linux)   ! elsewhere SIGUSR1 has another number
     ignore = transfer(1_c_intptr_t, ignore)   ! SIG_IGN of the C library
     previous = c_signal(int(sigxfsz, c_int), ignore)
     previous = c_signal(int(sigpipe, c_int), ignore)
     previous = c_signal(int(sigint, c_int), c_funloc(note_signal))
     previous = c_signal(int(sigterm, c_int), c_funloc(note_signal))
+    previous = c_signal(int(merge(10, 30, linux), c_int), c_funloc(note_signal))
   end subroutine catch_signals
 
   !> The signal that arrived since `catch_signals`, 0: none.
