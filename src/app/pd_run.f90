@@ -337,6 +337,7 @@ contains
         call ledger%fit(model%blocks)
         call model%operators%take_in(state%displacement)
         call model%supports%take_reactions(model%points%volume, run%clock%time(), state%force)
+        call state%forget(model%operators%domain%kept(model%operators%n))
       else
         call start(model, state)
         ledger = new_ledger(model%blocks)

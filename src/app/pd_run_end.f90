@@ -80,9 +80,9 @@ contains
     type(run_t), intent(in) :: run
     real(wp), allocatable :: velocity(:, :)
 
-    allocate (velocity, source=run%state%velocity)
+    allocate (velocity, source=run%model%points%free * run%state%velocity)
     call run%model%blocks%spread_rows(velocity)
-    fastest_row = maxloc(sum((run%model%points%free * velocity)**2, dim=2), dim=1)
+    fastest_row = maxloc(sum(velocity**2, dim=2), dim=1)
   end function fastest_row
 
   !> What mends a balance.

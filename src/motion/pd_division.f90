@@ -7,6 +7,7 @@ module pd_division
   use pd_kinds, only: wp
   use pd_model, only: model_t
   use pd_operator_parts, only: divide_operators
+  use pd_pages, only: forget_rows
   use pd_ranks, only: ranks_t
   use pd_shared_rows, only: new_shared_rows
   use pd_state, only: state_t
@@ -48,7 +49,7 @@ contains
     type(ranks_t), intent(in)    :: ranks   !! that take part
     type(model_t), intent(inout) :: model
     type(ranks_t) :: parts
-    integer :: k
+    integer :: k, kept(2)
 
     if (ranks%count == 1) return
     parts = ranks
@@ -59,6 +60,9 @@ contains
     associate (offset => model%blocks%offset, n => model%blocks%count)
       model%materials%first_run = model%materials%first_run(offset + 1:offset + n + 1)
     end associate
+    kept = model%operators%domain%kept(model%operators%n)
+    call forget_rows(model%points%free, kept)
+    call forget_rows(model%points%place, kept)
     do k = 1, size(model%loads%items)
       call model%loads%items(k)%load%divide(model%blocks)
     end do

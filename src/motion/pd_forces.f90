@@ -146,7 +146,8 @@ contains
     integer  :: block, lo, hi, n_blocks
 
     n_blocks = operators%domain%blocks%count
-    allocate (next%h(operators%n, 4), next%p(operators%n, 4), source=0.0_wp)
+    call operators%domain%make_room(operators%n, 4, next%h)
+    call operators%domain%make_room(operators%n, 4, next%p)
     call operators%take_in(state%velocity)
     !$omp parallel do schedule(static) default(none) private(block, lo, hi, p) &
     !$omp shared(n_blocks, operators, materials, time_step, state, next)

@@ -6,6 +6,7 @@ module pd_stability
   use pd_forces, only: linear_forces, next_step_t, prepare_next_step
   use pd_kinds, only: block_sum, n_block, wp
   use pd_model, only: model_t
+  use pd_pages, only: forget_rows
   use pd_state, only: state_t
   implicit none
   private
@@ -75,20 +76,27 @@ contains
     real(wp) :: diagonal(most_iterations), off_diagonal(0:most_iterations)
     real(wp) :: ritz(0:most_iterations)
     real(wp) :: tolerance
-    integer  :: k, n, look_back
+    integer  :: k, n, look_back, kept(2)
 
     look_back = merge(5, 10, present(state))
     tolerance = merge(1.0e-2_wp, 3.0e-3_wp, present(state))
     n = size(model%points%volume)
-    allocate (q(n, 2), r(n, 2), q_old(n, 2), h(n, 4), source=0.0_wp)
+    kept = model%operators%domain%kept(n)
+    call model%operators%domain%make_room(n, 4, h)
+    call model%operators%domain%make_room(n, 2, q)
+    call model%operators%domain%make_room(n, 2, r)
+    call model%operators%domain%make_room(n, 2, q_old)
     allocate (density(n), source=model%materials%density_of(n))
     ! with weights of this size q has the size of a spacing, and its gradient that of 1
     allocate (volume(n), source=model%points%volume &
       / (sum(model%points%volume) * maxval(model%points%volume)))
     allocate (mass(n), source=volume * (density / model%materials%list(1)%density))
+    call forget_rows(density, kept)
+    call forget_rows(volume, kept)
+    call forget_rows(mass, kept)
     associate (free => model%points%free, blocks => model%blocks, &
       reference => model%materials%list(1)%density)
-      call scatter(model%points%volume, free, q)
+      call scatter(model%points%volume, free, kept, q)
       off_diagonal(0) = 0.0_wp
       ritz = 0.0_wp
       call scale_to(1.0_wp / sqrt(product_of(blocks, mass, q, q, free)), blocks, q)
@@ -115,16 +123,18 @@ contains
 
   !> A vector with every frequency in it: the same pseudo-random numbers in every run,
   !> whether or not there are rows without a point (volume 0).
-  subroutine scatter(volume, free, q)
-    real(wp), intent(in)  :: volume(:), free(:, :)
-    real(wp), intent(out) :: q(:, :)
+  subroutine scatter(volume, free, kept, q)
+    real(wp), intent(in)    :: volume(:), free(:, :)
+    integer,  intent(in)    :: kept(2)   !! first and last row that is needed
+    real(wp), intent(inout) :: q(:, :)
     real(wp), parameter :: golden = 0.6180339887498949_wp, silver = 0.4142135623730951_wp
     real(wp) :: x(2)
     integer  :: i, number
 
     number = 0
-    do i = 1, size(q, 1)
+    do i = 1, kept(2)
       if (volume(i) > 0.0_wp) number = number + 1
+      if (i < kept(1)) cycle
       x = real(number, wp)**2 * [golden, silver]
       q(i, :) = free(i, :) * (x - aint(x) - 0.5_wp)
     end do

@@ -2,6 +2,8 @@
 module pd_domain
   use pd_blocks, only: blocks_t, new_blocks
   use pd_halo, only: halo_t
+  use pd_kinds, only: wp
+  use pd_pages, only: forget_rows
   use pd_ranks, only: ranks_t
   implicit none
   private
@@ -17,6 +19,8 @@ module pd_domain
     procedure :: take_part
     procedure :: meet
     procedure :: rows_of
+    procedure :: kept
+    procedure :: make_room
   end type domain_t
 
 contains
@@ -59,6 +63,30 @@ contains
     if (size(mine) > 0) self%known = [min(self%known(1), mine(1)), &
       max(self%known(2), mine(size(mine)))]
   end subroutine meet
+
+  !> The rows of n whose values are needed here. Sums by columns read some more, without weight.
+  pure function kept(self, n) result(ends)
+    class(domain_t), intent(in) :: self
+    integer,         intent(in) :: n   !! rows of the fields
+    integer :: ends(2)
+
+    ends = [1, n]
+    if (.not. allocated(self%blocks%ranks%before)) return
+    ! beyond the first and the last row of all there is a margin
+    if (self%known(1) > self%blocks%ends(1)) ends(1) = self%known(1)
+    if (self%known(2) < self%blocks%ends(2)) ends(2) = self%known(2)
+  end function kept
+
+  !> Make room for a field of zeros, unless that is done.
+  subroutine make_room(self, n, components, field)
+    class(domain_t), intent(in) :: self
+    integer,         intent(in) :: n, components
+    real(wp), allocatable, intent(inout) :: field(:, :)   !! (n,components)
+
+    if (allocated(field)) return
+    allocate (field(n, components), source=0.0_wp)
+    call forget_rows(field, self%kept(n))
+  end subroutine make_room
 
   !> Those of some rows that are between two.
   pure function within(rows, ends)

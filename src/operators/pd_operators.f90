@@ -159,8 +159,7 @@ contains
 
     call self%domain%halo%exchange(u)
     call self%weigh_in(u)
-    if (.not. allocated(self%force_tensor)) &
-      allocate (self%force_tensor(self%n, 4), source=0.0_wp)   ! rows without a point stay zero
+    call self%domain%make_room(self%n, 4, self%force_tensor)   ! rows without a point stay zero
   end subroutine take_in
 
   !> Keep u times the share of the points and, for Z, times the stiffness of the control.
@@ -172,7 +171,7 @@ contains
     first = self%domain%known(1)
     last = self%domain%known(2)
     if (self%weighs) then
-      if (.not. allocated(self%weighed)) allocate (self%weighed(self%n, 2), source=0.0_wp)
+      call self%domain%make_room(self%n, 2, self%weighed)
       !$omp parallel do simd schedule(static) default(none) shared(self, u, first, last) private(i)
       do i = first, last
         self%weighed(i, 1) = self%share_of(i) * u(i, 1)
