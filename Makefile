@@ -34,6 +34,12 @@ else
   $(error BUILD=$(BUILD): it must be opt or debug)
 endif
 
+# MPI=1 builds the program for several ranks, beside the other one: mpi/pd_ranks.f90 takes the
+# place of src/base/pd_ranks.f90.
+ifneq ($(MPI),)
+  program := $(patsubst bin/perigeo%,bin/perigeo-mpi%,$(program))
+endif
+
 warnings := -Wall -Wextra -Wpedantic -Wimplicit-interface -Wconversion
 # gfortran warns of allocatable variables that are not allocated yet, without reason.
 no_false_warnings := -Wno-uninitialized -Wno-maybe-uninitialized
@@ -44,7 +50,7 @@ else
 endif
 flags     = -std=f2008 $(strip $(FFLAGS) $(march)) -fopenmp
 venv     := .venv
-build    := build/$(BUILD)
+build    := build/$(BUILD)$(if $(MPI),-mpi)
 
 # ---------------------------------------------------------------------------------- targets
 .SUFFIXES:
@@ -109,7 +115,9 @@ report-view:       ## open that page in a browser without a window: checks and s
 
 test:              ## set-up, build and the whole test suite; BUILD=debug: with all checks
 	@sh tools/setup.sh test
-	@$(venv)/bin/python tests/support/run_tests.py --make '$(MAKE)' --build $(BUILD)
+	@$(if $(MPI),sh tools/setup.sh mpi && $(submake) MPI= $(parallel) program && \
+	  $(submake) $(parallel) program)
+	@$(venv)/bin/python tests/support/run_tests.py --make '$(MAKE) MPI=' --build $(BUILD)
 
 debug:             ## build bin/perigeo-debug, which checks bounds and traps invalid numbers
 	@$(submake) BUILD=debug program
@@ -189,6 +197,13 @@ ifeq ($(MARCH),native)
     march =
   endif
 endif
+ifneq ($(MPI),)
+  mpi_compile := $(shell sh tools/mpi_flags.sh compile)
+  mpi_link    := $(shell sh tools/mpi_flags.sh link)
+  ifeq ($(mpi_link),)
+    $(error no MPI for Fortran (mpifort): run tools/setup.sh mpi, which installs or names it)
+  endif
+endif
 hdf5_compile := $(shell H5FC='$(H5FC)' sh tools/hdf5_flags.sh compile '$(FC)')
 hdf5_link    := $(shell H5FC='$(H5FC)' sh tools/hdf5_flags.sh link '$(FC)')
 ifeq ($(hdf5_link),)
@@ -206,13 +221,14 @@ endif
 left_out := $(if $(aligned),,pd_memory)
 
 sources := $(filter-out $(left_out:%=src/system/%.f90),$(wildcard $(layers:%=src/%/*.f90)))
+sources := $(if $(MPI),$(sources:src/base/pd_ranks.f90=mpi/pd_ranks.f90),$(sources))
 objects := $(patsubst %.f90,$(build)/%.o,$(notdir $(sources))) $(build)/pd_version.o
-vpath %.f90 $(layers:%=src/%) $(build)
-compile  = $(FC) $(flags) $(warnings) $(hdf5_compile) -J$(build)
+vpath %.f90 $(if $(MPI),mpi) $(layers:%=src/%) $(build)
+compile  = $(FC) $(flags) $(warnings) $(hdf5_compile) $(mpi_compile) -J$(build)
 say      = $(if $(V),,@echo '  $(1)';)
 
 # These files change only when their contents do: what everything depends on, and the version.
-update := $(shell echo '$(compile) $(hdf5_link) $(aligned)' | \
+update := $(shell echo '$(compile) $(hdf5_link) $(mpi_link) $(aligned)' | \
   sh tools/update_file.sh $(build)/flags; \
   sh tools/version.sh '$(FC)' '$(flags)' | sh tools/update_file.sh $(build)/pd_version.f90)
 
@@ -220,7 +236,7 @@ program: $(if $(wildcard src/app/perigeo.f90),$(program),objects)
 objects: $(objects)
 
 $(program): $(objects)
-	$(call say,link     $@)$(FC) $(flags) -o $@ $(objects) $(hdf5_link) $(aligned)
+	$(call say,link     $@)$(FC) $(flags) -o $@ $(objects) $(hdf5_link) $(mpi_link) $(aligned)
 
 $(build)/%.o: %.f90 $(build)/flags
 	$(call say,compile  $<)$(compile) -c $< -o $@

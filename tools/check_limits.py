@@ -46,7 +46,7 @@ FORTRAN_BEGIN = re.compile(
 )
 FORTRAN_END = re.compile(r"^\s*end\s*(?:subroutine|function|program)\b", re.IGNORECASE)
 SUFFIXES = (".f90", ".pf", ".py")
-FOLDERS = ("src", "tests", "tools", "postproc")
+FOLDERS = ("src", "mpi", "tests", "tools", "postproc")
 
 
 def fortran_procedures(lines: list[str]) -> list[tuple[str, int, int]]:

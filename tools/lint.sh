@@ -29,6 +29,12 @@ compiler_warnings() {
   $make --no-print-directory BUILD=lint PFUNIT_DIR= $parallel -k objects units
 }
 
+# Where there is MPI, the form of the ranks with messages is compiled too.
+ranks_with_messages() {
+  [ -z "$(sh tools/mpi_flags.sh link)" ] ||
+    $make --no-print-directory BUILD=lint MPI=1 build/lint-mpi/pd_ranks.o
+}
+
 layers() {
   # One word for each layer.
   # shellcheck disable=SC2046
@@ -65,7 +71,8 @@ spelling() {
 
 echo "Lint"
 stage "compiler warnings" compiler_warnings
-stage "fortitude" $bin/fortitude check --no-show-fixes src tests
+stage "ranks with messages" ranks_with_messages
+stage "fortitude" $bin/fortitude check --no-show-fixes src mpi tests
 stage "layers" layers
 stage "limits" limits
 stage "layers of perigeo_post" $bin/python tools/check_python_layers.py

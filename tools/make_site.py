@@ -37,6 +37,7 @@ PAGES = {
     "doc/design.md": "design",
     "doc/verification.md": "verification",
     "doc/performance.md": "performance",
+    "doc/parallel.md": "parallel",
     "postproc/README.md": "postproc",
     "CONTRIBUTING.md": "contributing",
     "CHANGELOG.md": "changelog",

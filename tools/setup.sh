@@ -1,9 +1,10 @@
 #!/bin/sh
-# Find what perigeo needs and install what is missing:  sh tools/setup.sh [run|test|lint|site]
+# Find what perigeo needs and install what is missing:  sh tools/setup.sh [run|test|lint|site|mpi]
 #
 #   run   compiler, make, HDF5, Python with perigeo-post in .venv (the default)
 #   test  also what the tests need          lint  also the linters
 #   site  what makes the pages of `make site`
+#   mpi   what `make MPI=1` needs, and no Python
 #
 # System packages are installed only where that takes no question: as root, or with a sudo that
 # asks for no password (Homebrew and an active conda environment need neither). Elsewhere this
@@ -11,8 +12,8 @@
 # of times: what is there stays as it is.
 level=${1:-run}
 case $level in
-  run | test | lint | site) ;;
-  *) echo "usage: sh tools/setup.sh [run|test|lint|site]" >&2; exit 1 ;;
+  run | test | lint | site | mpi) ;;
+  *) echo "usage: sh tools/setup.sh [run|test|lint|site|mpi]" >&2; exit 1 ;;
 esac
 cd "$(dirname "$0")/.." || exit 1
 compiler=${FC:-gfortran}
@@ -42,7 +43,27 @@ FORTRAN
   return $works
 }
 
-# Sets `missing` to a list of: compiler make hdf5 python
+mpi_works() {
+  folder=$(mktemp -d "${TMPDIR:-/tmp}/perigeo-setup.XXXXXX") || return 1
+  cat > "$folder/try.f90" <<'FORTRAN'
+program try
+  use mpi_f08, only: mpi_init, mpi_finalize
+  implicit none
+  call mpi_init()
+  call mpi_finalize()
+end program try
+FORTRAN
+  link=$(sh tools/mpi_flags.sh link)
+  # The lists of flags are split on purpose.
+  # shellcheck disable=SC2046,SC2086
+  [ -n "$link" ] && has mpirun && $compiler $(sh tools/mpi_flags.sh compile) -J"$folder" \
+    "$folder/try.f90" -o "$folder/try" $link >"$folder/log" 2>&1
+  works=$?
+  rm -rf "$folder"
+  return $works
+}
+
+# Sets `missing` to a list of: compiler make hdf5 mpi python
 find_missing() {
   missing=
   has make || missing="$missing make"
@@ -52,6 +73,10 @@ find_missing() {
     missing="$missing compiler"
     # Without a compiler only the wrapper can be looked for.
     if ! has "${H5FC:-h5fc}" && ! has h5pfc; then missing="$missing hdf5"; fi
+  fi
+  if [ "$level" = mpi ]; then
+    mpi_works || missing="$missing mpi"
+    return
   fi
   [ -n "$(sh tools/find_python.sh)" ] || missing="$missing python"
 }
@@ -80,18 +105,23 @@ package() {
   case $system:$1 in
     apt-get:compiler) echo gfortran libc6-dev ;;
     apt-get:hdf5) echo libhdf5-dev ;;
+    apt-get:mpi) echo libopenmpi-dev openmpi-bin ;;
     apt-get:python) echo python3 python3-venv ;;
     dnf:compiler) echo gcc-gfortran ;;
     dnf:hdf5) echo hdf5-devel ;;
+    dnf:mpi) echo openmpi-devel ;;
     dnf:python) echo python3 python3-pip ;;
     pacman:compiler) echo gcc-fortran ;;
     pacman:hdf5) echo hdf5 ;;
+    pacman:mpi) echo openmpi ;;
     pacman:python) echo python ;;
     brew:compiler) echo gcc ;;
     brew:hdf5) echo hdf5 ;;
+    brew:mpi) echo open-mpi ;;
     brew:python) echo python ;;
     conda:compiler) echo gfortran ;;
     conda:hdf5) echo hdf5 ;;
+    conda:mpi) echo openmpi ;;
     conda:python) echo python ;;
     *:make) echo make ;;
   esac
@@ -202,4 +232,4 @@ for attempt in first second; do
   rm -f "$log" "$log.commands"
 done
 
-sh tools/python_env.sh "$level" || exit 1
+[ "$level" = mpi ] || sh tools/python_env.sh "$level" || exit 1

@@ -3,6 +3,7 @@ module pd_check
   use, intrinsic :: iso_fortran_env, only: output_unit
   use omp_lib, only: omp_get_max_threads
   use pd_command_line, only: options_t, print_help
+  use pd_division, only: share_t, shares
   use pd_doubt_list, only: write_doubt_table
   use pd_errors, only: error_list_t, exit_file, exit_input, exit_ok, outcome_t
   use pd_input, only: print_input
@@ -10,9 +11,11 @@ module pd_check
   use pd_input_types, only: all_keys
   use pd_kinds, only: wp
   use pd_points_file, only: write_points
-  use pd_run, only: run_t
+  use pd_ranks, only: ranks_t
+  use pd_run, only: run_t, words_on_cores
   use pd_stability, only: find_highest_frequency
   use pd_summary, only: estimated_seconds, summarise, summary_t
+  use pd_text, only: integer_text, short_number
   use pd_version, only: code_version, git_hash
   implicit none
   private
@@ -21,11 +24,18 @@ module pd_check
 
 contains
 
-  !> Answer what needs no model; the program then ends.
-  subroutine answer_questions(options, outcome)
+  !> Answer what needs no model; the program then ends. Rank 0 answers.
+  subroutine answer_questions(options, ranks, outcome)
     type(options_t), intent(in)    :: options
+    type(ranks_t),   intent(in)    :: ranks
     type(outcome_t), intent(inout) :: outcome
     type(error_list_t) :: errors
+
+    if (ranks%mine > 0) then
+      if (options%help .or. options%version .or. options%input_reference .or. options%doubts .or. &
+        options%print_input) call outcome%end_with(exit_ok)
+      return
+    end if
 
     if (options%help) call print_help()
     if (options%version) write (output_unit, '(a)') 'perigeo '//code_version//' ('//git_hash//')'
@@ -54,6 +64,10 @@ contains
     type(summary_t) :: summary
     integer :: i
 
+    if (run%ranks%mine > 0) then   ! rank 0 looks at the whole model
+      call outcome%end_with(exit_ok)
+      return
+    end if
     if (points_path /= '') call write_points(points_path, run%input, run%model, errors)
     call outcome%end_if_any(errors, exit_file)
     if (outcome%done) return
@@ -63,10 +77,31 @@ contains
     do i = 1, size(summary%lines)
       write (output_unit, '(a)') trim(summary%lines(i))
     end do
+    if (run%ranks%count > 1) call print_shares(run)
     call print_estimate(estimated_seconds(run%model, run%schedule))
     call run%doubts%print(output_unit)
     call outcome%end_with(exit_ok)
   end subroutine print_check
+
+  !> What the ranks would have: points, and the halo that they exchange twice per step.
+  subroutine print_shares(run)
+    type(run_t), intent(in) :: run
+    type(share_t) :: of_rank(run%ranks%count)
+
+    of_rank = shares(run%model, size(of_rank))
+    write (output_unit, '(a)') '  ranks               '//integer_text(size(of_rank))//': '// &
+      integer_text(minval(of_rank%points))//' to '//integer_text(maxval(of_rank%points))// &
+      ' points each, balance '//short_number(sum(real(of_rank%points, wp)) &
+      / (real(size(of_rank), wp) * real(maxval(of_rank%points), wp)))
+    write (output_unit, '(a)') '  halo                '//integer_text(maxval(of_rank%halo))// &
+      ' rows of other ranks at most, '//short_number(maxval(real(of_rank%halo, wp) &
+      / real(max(1, of_rank%rows), wp)))//' of the own ones; displacement and force tensor, '// &
+      short_number(48.0e-3_wp * real(maxval(of_rank%halo), wp))//' kB per step'
+    write (output_unit, '(a)') '  memory              about half of that above in every rank, for each '// &
+      'sets up the whole body'
+    if (words_on_cores(run%ranks) /= '') &
+      write (output_unit, '(a)') '  cores               '//words_on_cores(run%ranks)
+  end subroutine print_shares
 
   !> Last line of --check.
   subroutine print_estimate(seconds)

@@ -220,7 +220,7 @@ contains
       '  bin/perigeo input/compression_quick.nml', &
       '  .venv/bin/perigeo-post contours results/compression_quick/compression_quick.h5', &
       '', &
-      'Ctrl-C (or SIGTERM) writes a checkpoint and stops; --restart goes on from there.', &
+      'Ctrl-C (or SIGTERM, SIGUSR1) writes a checkpoint and stops; --restart goes on from there.', &
       '', &
       'exit status: 0 finished; 1 wrong command line; 2 wrong input file; 3 the model cannot be', &
       '  set up; 4 the calculation failed; 5 a file cannot be written or read (also: results of', &

@@ -72,6 +72,7 @@ contains
       call run%timing%lap(kernel_history)
     end if
     if (.not. outcome%done) call outcome%end_if_any(errors, exit_file)
+    call outcome%agree(run%ranks)
   end subroutine look_at_time_step
 
   !> Go back to a part of the stable step where half of the margin is used up.
@@ -270,6 +271,7 @@ contains
         'too long for the velocity of the platens', run, errors)
     end associate
     call outcome%end_if_any(errors, exit_file)
+    call outcome%agree(run%ranks)
   end subroutine look_at_end
 
   !> Where no equilibrium is near, the next one may be far: told once.

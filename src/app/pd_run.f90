@@ -1,11 +1,12 @@
 !> A run: what it consists of, and how it begins.
 module pd_run
   use, intrinsic :: iso_fortran_env, only: compiler_version, int64, output_unit
-  use omp_lib, only: omp_get_max_threads
+  use omp_lib, only: omp_get_max_threads, omp_get_num_procs
   use pd_body_force, only: body_force_t, new_body_force
   use pd_checkpoint, only: checkpoint_mark, checkpoint_t
   use pd_clock, only: clock_t
   use pd_command_line, only: options_t
+  use pd_division, only: divide_model
   use pd_doubt_list, only: doubts_t
   use pd_errors, only: error_list_t, exit_file, exit_input, exit_model, exit_ok, outcome_t
   use pd_files, only: prepare_folder
@@ -20,6 +21,7 @@ module pd_run
   use pd_observe, only: column_t, moment_at, observation_t, observe
   use pd_own_files, only: keep_inputs, lock_path
   use pd_plausibility, only: look_at_model, look_at_motion
+  use pd_ranks, only: ranks_t
   use pd_record, only: largest_reaction_before, load_checkpoint, load_doubts, look_for_end, &
     observe_state, open_record, record_doubts, record_frame, record_line, record_progress, &
     record_row, record_t, results_in_the_way, same_history, same_points
@@ -34,16 +36,19 @@ module pd_run
   use pd_step, only: step_work_t
   use pd_step_limit, only: new_step_limit, step_limit_t
   use pd_summary, only: summarise, summary_t
+  use pd_system, only: pending_signal
   use pd_tables, only: new_table
+  use pd_text, only: integer_text
   use pd_timing, only: timing_t
   use pd_version, only: build_flags, code_version, git_hash
   implicit none
   private
 
   public :: run_t, set_up_run, open_outputs, start_increments, add_release
-  public :: keep_standing_load
+  public :: keep_standing_load, signal_of, any_rank, words_on_cores
 
   type :: run_t
+    type(ranks_t)      :: ranks               !! that share it
     type(input_t)      :: input
     type(stage_t), allocatable :: stages(:)
     type(model_t)      :: model
@@ -70,6 +75,27 @@ module pd_run
   end type run_t
 
 contains
+
+  !> The signal that any rank has received, 0: none.
+  integer function signal_of(run) result(signal)
+    type(run_t), intent(in) :: run
+    integer :: found(1)
+
+    found = pending_signal()
+    call run%ranks%largest_numbers(found)
+    signal = found(1)
+  end function signal_of
+
+  !> Whether something is so on any rank. Every rank must come here.
+  logical function any_rank(run, here)
+    type(run_t), intent(in) :: run
+    logical,     intent(in) :: here
+    integer :: found(1)
+
+    found = merge(1, 0, here)
+    call run%ranks%largest_numbers(found)
+    any_rank = found(1) > 0
+  end function any_rank
 
   !> Input, body, model, time step, and the state to begin with: unloaded, or of a checkpoint.
   subroutine set_up_run(options, run, outcome)
@@ -111,6 +137,12 @@ contains
         allowed='the version of perigeo that wrote it, or --force for a new run')
       call outcome%end_if_any(errors, exit_file)
       if (outcome%done) return
+    end if
+    if (.not. options%check) then
+      call outcome%agree(run%ranks)
+      if (outcome%done) return
+      call run%ranks%largest_numbers(run%doubts%step)   ! what has been told is not looked at again
+      call divide_model(run%ranks, run%model)
     end if
     run%clock = run%checkpoint%clock
     run%limit = run%checkpoint%limit
@@ -182,6 +214,7 @@ contains
     release = new_body_force('release', -state%released, model%points%volume, 0.0_wp, &
       [0.0_wp, 0.0_wp], 'what the stage has changed')
     release%factor = new_table([stage%start_time, stage%end_time], [1.0_wp, 0.0_wp], 0.0_wp)
+    call release%divide(model%blocks)
     call model%loads%append(release)
     model%releases = .true.
   end subroutine add_release
@@ -219,6 +252,20 @@ contains
     stem = run%input%run%output_dir//'/'//run%input%run%name
   end function stem_of
 
+  !> What is to be said of threads that share the cores that mpirun has given a rank; '': nothing.
+  function words_on_cores(ranks) result(text)
+    type(ranks_t), intent(in) :: ranks
+    character(:), allocatable :: text
+    integer :: threads, cores
+
+    text = ''
+    threads = omp_get_max_threads()
+    cores = omp_get_num_procs()
+    if (ranks%count > 1 .and. threads > cores) text = integer_text(threads)// &
+      ' threads of a rank share '//integer_text(cores)//' of the cores; mpirun --map-by '// &
+      'slot:PE=N gives each rank N of them'
+  end function words_on_cores
+
   !> Results of an earlier run are overwritten or continued only on request, those of a living one
   !> never; a checkpoint is read if the run continues from it.
   subroutine look_for_earlier_run(options, run, outcome)
@@ -226,21 +273,14 @@ contains
     type(run_t),     intent(inout) :: run
     type(outcome_t), intent(inout) :: outcome
     type(error_list_t) :: errors, input_errors
-    character(:), allocatable :: living, warning
-    logical :: complete, same
+    character(:), allocatable :: warning
+    logical :: complete
 
-    living = lock_holder(lock_path(stem_of(run)))
-    if (living /= '') call errors%add(living, stem_of(run))
-    call outcome%end_if_any(errors, exit_file)
+    complete = .false.
+    if (run%ranks%mine == 0) call look_at_files(options, run, complete, outcome)
+    call outcome%agree(run%ranks)
     if (outcome%done) return
     if (options%restart) then
-      call look_for_end(run%input, complete, same)
-      if (complete .and. same) then
-        if (.not. options%quiet) write (output_unit, '(a)') 'the run is finished: '// &
-          stem_of(run)//'.h5 is complete; a later end goes on from a checkpoint, --force begins anew'
-        call outcome%end_with(exit_ok)
-        return
-      end if
       run%mark = checkpoint_mark(stem_of(run))
       call load_checkpoint(run%input, run%checkpoint, run%state, run%ledger, warning, errors, &
         input_errors)
@@ -251,11 +291,36 @@ contains
       if (outcome%done) return
       if (warning /= '') call run%doubts%add('older_checkpoint', 0.0_wp, warning)
       call load_doubts(stem_of(run), run%checkpoint, run%doubts)
+    end if
+  end subroutine look_for_earlier_run
+
+  !> Whether the files of the run are another one's, or finished already. One rank looks, and takes
+  !> the lock later: others would hold it against each other.
+  subroutine look_at_files(options, run, complete, outcome)
+    type(options_t), intent(in)    :: options
+    type(run_t),     intent(in)    :: run
+    logical,         intent(out)   :: complete   !! a finished run, of which a restart is asked
+    type(outcome_t), intent(inout) :: outcome
+    type(error_list_t) :: errors
+    character(:), allocatable :: living
+    logical :: same
+
+    complete = .false.
+    living = lock_holder(lock_path(stem_of(run)))
+    if (living /= '') call errors%add(living, stem_of(run))
+    call outcome%end_if_any(errors, exit_file)
+    if (outcome%done) return
+    if (options%restart) then
+      call look_for_end(run%input, complete, same)
+      if (.not. (complete .and. same)) return
+      if (.not. options%quiet) write (output_unit, '(a)') 'the run is finished: '// &
+        stem_of(run)//'.h5 is complete; a later end goes on from a checkpoint, --force begins anew'
+      call outcome%end_with(exit_ok)
     else
       call refuse_results(options, run, errors)
       call outcome%end_if_any(errors, exit_file)
     end if
-  end subroutine look_for_earlier_run
+  end subroutine look_at_files
 
   !> Report an error where there are results that the user does not want to lose.
   subroutine refuse_results(options, run, errors)
@@ -302,6 +367,7 @@ contains
         call move_planes(model, run%clock%time())
         call model%operators%take_in(state%displacement, model%operators%mirror%place)
         call model%supports%take_reactions(model%points%volume, run%clock%time(), state%force)
+        call state%forget(model%operators%domain%kept(model%operators%n))
       else
         call start(model, state)
         ledger = new_ledger(model%blocks)
@@ -330,13 +396,15 @@ contains
     call get_command(length=length)
     allocate (character(length) :: command)
     call get_command(command)
-    call claim_files(options, run, errors)
+    if (run%ranks%mine == 0) call claim_files(options, run, errors)
     call outcome%end_if_any(errors, exit_file)
+    call outcome%agree(run%ranks)
     if (outcome%done) return
     call open_record(run%input, provenance_t(code_version, git_hash, compiler_version(), &
       build_flags, command, omp_get_max_threads()), run%model, run%schedule, run%checkpoint, &
       options%quiet, run%record, errors)
     call outcome%end_if_any(errors, exit_file)
+    call outcome%agree(run%ranks)
     if (outcome%done) return
     associate (record => run%record)
       call record_line(record, 'perigeo '//code_version//' ('//git_hash//'), '// &
@@ -349,12 +417,17 @@ contains
         call record_line(record, 'warning: '//run%doubts%message(i), errors)
       end do
       call record_doubts(record, run%doubts, errors)
+      if (words_on_cores(run%ranks) /= '') &
+        call record_line(record, 'warning: '//words_on_cores(run%ranks), errors)
       if (run%checkpoint%history_rows > 0) call largest_reaction_before(record, run%model, &
         run%checkpoint%history_rows, run%largest_reaction)
       call observe_state(run%model, run%state, run%ledger, run%clock, record)
       if (run%checkpoint%history_rows == 0) then
         call record_row(record, errors)
-        if (errors%count() == 0) call record_frame(run%model, run%state, record, errors)
+        call outcome%end_if_any(errors, exit_file)
+        call outcome%agree(run%ranks)
+        if (outcome%done) return
+        call record_frame(run%model, run%state, record, errors)
       else
         call record_line(record, 'going on from a checkpoint', errors)
         do i = 1, run%checkpoint%rows_owed
@@ -368,6 +441,7 @@ contains
     end associate
     deallocate (run%model%strength)   ! the state has it, and the result file
     call outcome%end_if_any(errors, exit_file)
+    call outcome%agree(run%ranks)
     run%whole = .not. outcome%done
     call system_clock(run%last_checkpoint)
     run%loop_start = run%last_checkpoint

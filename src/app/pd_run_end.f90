@@ -60,6 +60,7 @@ contains
     if (size(run%input%strength_reduction) > 0) call record_line(run%record, &
       'no factor of safety: the body does not bear the loads of the end of the run', errors)
     call outcome%end_if_any(errors, exit_file)
+    call outcome%agree(run%ranks)
   end subroutine end_without_equilibrium
 
   !> How far the present stage has come; '' without stages.
@@ -76,10 +77,13 @@ contains
   end function stage_in_words
 
   !> The row that moves fastest among those that are free: where a run fails that gains energy.
-  pure integer function fastest_row(run)
+  integer function fastest_row(run)
     type(run_t), intent(in) :: run
+    real(wp), allocatable :: velocity(:, :)
 
-    fastest_row = maxloc(sum((run%model%points%free * run%state%velocity)**2, dim=2), dim=1)
+    allocate (velocity, source=run%model%points%free * run%state%velocity)
+    call run%model%blocks%spread_rows(velocity)
+    fastest_row = maxloc(sum(velocity**2, dim=2), dim=1)
   end function fastest_row
 
   !> What mends a balance. Without a control of zero-energy modes these grow until the state fails:
@@ -99,18 +103,26 @@ contains
     integer,     intent(in) :: row
     type(run_t), intent(in) :: run
     character(:), allocatable :: text
-    real(wp) :: z2(run%model%operators%n)
+    real(wp) :: z2(run%model%operators%n), h(4), part(1)
+    logical  :: mine
 
-    associate (h => run%state%displacement_gradient(row, :))
-      text = 'not a number there'
+    text = 'not a number there'
+    associate (blocks => run%model%blocks)
+      mine = row >= blocks%first .and. row <= blocks%last
+      h = 0.0_wp
+      if (mine) h = run%state%displacement_gradient(row, :)
+      call blocks%ranks%fill_in(h)
       if (.not. all(ieee_is_finite(h)) .or. maxval(abs(h)) > 1.0e100_wp) return
       call run%model%operators%zero_energy_squared(run%state%displacement, &
         run%state%displacement_gradient, z2)
-      text = 'there strain is '//short_number(h(1))//', '//short_number(h(4))//', '// &
-        short_number(0.5_wp * (h(2) + h(3)))//' (xx, yy, xy), det F '// &
-        short_number((1.0_wp + h(1)) * (1.0_wp + h(4)) - h(2) * h(3))//', zero_energy '// &
-        short_number(sqrt(z2(row) / run%model%operators%weight_sum(row)) / run%model%delta)
+      part = 0.0_wp
+      if (mine) part = sqrt(z2(row) / run%model%operators%weight_sum(row)) / run%model%delta
+      call blocks%ranks%fill_in(part)
     end associate
+    text = 'there strain is '//short_number(h(1))//', '//short_number(h(4))//', '// &
+      short_number(0.5_wp * (h(2) + h(3)))//' (xx, yy, xy), det F '// &
+      short_number((1.0_wp + h(1)) * (1.0_wp + h(4)) - h(2) * h(3))//', zero_energy '// &
+      short_number(part(1))
   end function state_at
 
   !> The calculation has failed: write the state apart from the valid frames, and report where.
@@ -149,6 +161,7 @@ contains
     call record_line(run%record, 'results in '//run%record%stem//'.h5, .xdmf, _history.csv', errors)
     call close_record(run%record, errors)
     call outcome%end_if_any(errors, exit_file)
+    call outcome%agree(run%ranks)
   end subroutine finish_run
 
   !> A run that ends because of a file: keep its state, if that can be written.
@@ -159,6 +172,7 @@ contains
     character(:), allocatable :: text
 
     if (outcome%status /= exit_file .or. .not. run%whole) return
+    if (run%ranks%count > 1 .and. .not. outcome%agreed) return   ! the others are not here
     call save_last_checkpoint(run%model, run%state, run%ledger, run%clock, run%limit, &
       run%record, errors)
     text = 'the state of step '//integer_text(run%clock%step)//' could not be kept'

@@ -6,6 +6,7 @@
 !> stage (a load, `pd_body_force`).
 !> Source: doc/theory.md, section 7.
 module pd_run_stages
+  use pd_division, only: divide_model
   use pd_doubt_list, only: doubts_t
   use pd_errors, only: error_list_t, exit_file, exit_input, exit_model, outcome_t
   use pd_fields, only: clearing_t
@@ -45,6 +46,7 @@ contains
     call carry_over(run, model)
     run%clock%stage = run%clock%stage + 1
     call add_release(run%stages(run%clock%stage), run%state, run%model)
+    call run%model%shared%bring(run%state%force)
     call run%model%supports%take_reactions(run%model%points%volume, run%clock%time(), &
       run%state%force)
     call enter_change(run)
@@ -56,6 +58,7 @@ contains
         short_number(run%clock%time())//' s', errors)
     end associate
     call outcome%end_if_any(errors, exit_file)
+    call outcome%agree(run%ranks)
   end subroutine begin_stage_if_due
 
   !> The model of the next stage.
@@ -72,8 +75,10 @@ contains
         input_errors, errors)
       if (errors%count() + input_errors%count() == 0) &
         call set_up_model(run%input, model, errors, stage)
-      if (errors%count() + input_errors%count() == 0) &
+      if (errors%count() + input_errors%count() == 0) then
         call keep_standing_load(run, stage, model)
+        call divide_model(run%ranks, model)
+      end if
     end associate
     call outcome%end_if_any(input_errors, exit_input)
     call outcome%end_if_any(errors, exit_model)
@@ -99,6 +104,7 @@ contains
       state%force = state%force - state%released
     end associate
     call release_set_up(model)
+    run%ledger = run%ledger%gathered(run%model%blocks)
     run%model = model
     call run%ledger%fit(run%model%blocks)
   end subroutine carry_over

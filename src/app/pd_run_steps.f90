@@ -8,7 +8,7 @@ module pd_run_steps
   use pd_progress, only: progress_due
   use pd_record, only: observe_state, record_frame, record_line, record_progress, record_row, &
     save_checkpoint
-  use pd_run, only: run_t
+  use pd_run, only: any_rank, run_t
   use pd_run_end, only: fail
   use pd_system, only: pending_signal, sigint, signal_name
   use pd_timing, only: kernel_history
@@ -20,7 +20,9 @@ module pd_run_steps
   !> What is written after a step. This is known before the step: only then must its state be whole.
   type :: due_t
     logical :: row = .false., frame = .false., checkpoint = .false.
-    logical :: stop = .false.      !! a signal came
+    logical :: stop = .false.      !! a signal came, or there was trouble with a file
+    integer :: signal = 0          !! its number
+    logical :: progress = .false.  !! is shown
     logical :: anything = .false.  !! something is written: the state will be observed
     logical :: whole = .false.     !! the state will be looked at
   end type due_t
@@ -28,22 +30,32 @@ module pd_run_steps
 contains
 
   !> What is due after a step. A signal that comes during a step takes effect after the next one.
+  !> Clocks, signals and trouble with files differ from rank to rank: what one of them finds due is
+  !> due.
   type(due_t) function due_after_step(step, run) result(due)
     integer,     intent(in) :: step
     type(run_t), intent(in) :: run
     integer(int64) :: now, rate
+    integer :: found(4)
 
     due%row = run%schedule%row_due(step)
     due%frame = run%schedule%frames_due(step) > 0
-    due%stop = pending_signal() /= 0 .or. run%trouble%count() > 0
-    due%checkpoint = due%stop
+    if (.not. run%record%elsewhere) &
+      due%progress = progress_due(run%record%progress, step, run%schedule%steps)
     associate (every => run%input%output%checkpoint_every)
       if (every > 0.0_wp) then
         call system_clock(now, rate)
-        due%checkpoint = due%checkpoint .or. step == run%schedule%steps .or. &
+        due%checkpoint = step == run%schedule%steps .or. &
           real(now - run%last_checkpoint, wp) >= every * real(rate, wp)
       end if
     end associate
+    found = [pending_signal(), merge(1, 0, due%checkpoint), merge(1, 0, due%progress), &
+      merge(1, 0, run%trouble%count() > 0)]
+    call run%ranks%largest_numbers(found)
+    due%signal = found(1)
+    due%stop = due%signal /= 0 .or. found(4) > 0
+    due%checkpoint = due%stop .or. found(2) > 0
+    due%progress = found(3) > 0
     due%anything = due%row .or. due%frame .or. due%checkpoint
     due%whole = due%anything .or. run%limit%look_due(step) .or. run%model%at_equilibrium
   end function due_after_step
@@ -57,6 +69,7 @@ contains
     type(run_t),     intent(inout) :: run
     type(outcome_t), intent(inout) :: outcome
     type(error_list_t) :: errors
+    logical :: in_trouble
 
     run%whole = due%whole
     if (failed_row > 0) &
@@ -69,21 +82,24 @@ contains
       if (outcome%done) return
     end if
     if (due%row) call record_row(run%record, errors)
-    if (progress_due(run%record%progress, run%clock%step, run%schedule%steps)) &
+    if (due%progress) &
       call record_progress(run%model, run%state, run%schedule, run%clock, run%record, errors)
     call run%timing%lap(kernel_history)
     call write_frames_and_checkpoint(due, run, errors)
     if (run%trouble%count() > 0) errors = run%trouble
     if (due%stop .and. errors%count() == 0) call record_line(run%record, &
-      'stopped by a signal ('//signal_name(pending_signal())// &
+      'stopped by a signal ('//signal_name(due%signal)// &
       '); --restart goes on from the checkpoint', errors)
-    if (errors%count() > 0 .and. .not. due%whole) then
+    in_trouble = errors%count() > 0
+    if (due%anything .or. due%progress) in_trouble = any_rank(run, in_trouble)
+    if (in_trouble .and. .not. due%whole) then
       run%trouble = errors   ! one step more, whose state can be kept
       return
     end if
     call outcome%end_if_any(errors, exit_file)
+    if (in_trouble) call outcome%agree(run%ranks)
     if (due%stop .and. .not. outcome%done) &
-      call outcome%end_with(merge(exit_interrupted, exit_terminated, pending_signal() == sigint))
+      call outcome%end_with(merge(exit_interrupted, exit_terminated, due%signal == sigint))
   end subroutine write_what_is_due
 
   !> Write the frames that are due at this step, and a checkpoint.

@@ -11,10 +11,10 @@ module pd_strength_reduction
   use pd_materials, only: material_t
   use pd_record, only: record_frame, record_line, record_tries, save_checkpoint
   use pd_relaxation, only: keep_start, relax, relaxed_t, return_to_start
-  use pd_run, only: run_t
+  use pd_run, only: run_t, signal_of
   use pd_run_end, only: fail, fastest_row
   use pd_state, only: state_t
-  use pd_system, only: pending_signal, sigint, signal_name
+  use pd_system, only: sigint, signal_name
   use pd_text, only: integer_text, short_number
   use pd_tries, only: tries_t
   implicit none
@@ -48,16 +48,16 @@ contains
           fastest_row(run), run, outcome)
         return
       end if
-      if (pending_signal() == 0) call try(given%last, start, unreduced, run, tries, errors)
+      if (signal_of(run) == 0) call try(given%last, start, unreduced, run, tries, errors)
       moving = run%state
-      do while (pending_signal() == 0 .and. .not. tries%held(2) &
+      do while (signal_of(run) == 0 .and. .not. tries%held(2) &
         .and. tries%most() - tries%least() > given%tolerance)
         call try(0.5_wp * (tries%least() + tries%most()), start, unreduced, run, tries, errors)
         if (tries%held(tries%n)) held = run%state
         if (.not. tries%held(tries%n)) moving = run%state
       end do
     end associate
-    if (pending_signal() /= 0) then
+    if (signal_of(run) /= 0) then
       run%state = start
       call stop_by_signal(run, outcome, errors)
       return
@@ -70,6 +70,7 @@ contains
     call record_tries(tries, run%record, errors)
     call tell_factor(tries, run, errors)
     call outcome%end_if_any(errors, exit_file)
+    call outcome%agree(run%ranks)
   end subroutine find_factor_of_safety
 
   !> Divide the strength by a factor, and relax from the start.
@@ -99,6 +100,7 @@ contains
       call forces(model, run%clock%time(), run%state, relaxation%blocks, run%timing, failed_row)
     end associate
     run%state%velocity = run%state%displacement - start%displacement
+    call run%model%blocks%spread_rows(run%state%velocity)
     largest = sqrt(maxval(sum(run%state%velocity**2, dim=2)))
     call tries%add(factor, relaxed%at_rest, largest, relaxed%residual)
     outcome = 'no equilibrium, unbalanced force '//short_number(relaxed%residual)
@@ -113,15 +115,18 @@ contains
     type(run_t),        intent(inout) :: run
     type(outcome_t),    intent(inout) :: outcome
     type(error_list_t), intent(inout) :: errors
+    integer :: signal
 
+    signal = signal_of(run)
     call save_checkpoint(run%model, run%state, run%ledger, run%clock, run%limit, run%record, &
       errors)
     if (errors%count() == 0) call record_line(run%record, &
-      'stopped by a signal ('//signal_name(pending_signal())// &
+      'stopped by a signal ('//signal_name(signal)// &
       '); --restart looks for the factor of safety anew', errors)
     call outcome%end_if_any(errors, exit_file)
+    call outcome%agree(run%ranks)
     if (.not. outcome%done) &
-      call outcome%end_with(merge(exit_interrupted, exit_terminated, pending_signal() == sigint))
+      call outcome%end_with(merge(exit_interrupted, exit_terminated, signal == sigint))
   end subroutine stop_by_signal
 
   subroutine tell_factor(tries, run, errors)

@@ -11,6 +11,7 @@ program perigeo
   use pd_exit, only: leave
   use pd_increment, only: take_increment
   use pd_lock, only: release_lock
+  use pd_ranks, only: begin_ranks
   use pd_run, only: open_outputs, run_t, set_up_run
   use pd_run_end, only: end_without_equilibrium, finish_run, keep_state
   use pd_run_stages, only: begin_stage_if_due
@@ -27,11 +28,13 @@ program perigeo
   type(due_t)     :: due
   integer         :: failed_row
 
+  call begin_ranks(run%ranks)
   call read_command_line(options, errors)
   call outcome%end_if_any(errors, exit_command_line)
-  if (.not. outcome%done) call answer_questions(options, outcome)
+  if (.not. outcome%done) call answer_questions(options, run%ranks, outcome)
   if (options%threads > 0) call omp_set_num_threads(options%threads)
   if (.not. outcome%done) call set_up_run(options, run, outcome)
+  call outcome%agree(run%ranks)
   if (options%check .and. .not. outcome%done) &
     call print_check(options%input_path, options%points_path, run, outcome)
   call catch_signals()
@@ -61,5 +64,5 @@ program perigeo
   if (.not. outcome%done) call finish_run(run, outcome)
   call keep_state(run, outcome)
   call release_lock(run%lock)
-  call leave(outcome)
+  call leave(outcome, run%ranks)
 end program perigeo

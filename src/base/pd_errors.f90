@@ -1,5 +1,6 @@
 !> Problems as values, exit statuses, and the outcome of a run.
 module pd_errors
+  use pd_ranks, only: ranks_t
   implicit none
   private
 
@@ -36,9 +37,12 @@ module pd_errors
     logical :: done = .false.
     integer :: status = exit_ok
     type(error_list_t) :: errors
+    logical :: agreed = .false.   !! all ranks end with this status
+    integer :: teller = 0         !! the rank that prints the errors
   contains
     procedure :: end_if_any
     procedure :: end_with
+    procedure :: agree
   end type outcome_t
 
 contains
@@ -117,5 +121,22 @@ contains
     self%done = .true.
     self%status = status
   end subroutine end_with
+
+  !> End on all ranks if one of them has ended. One rank tells: the first one that has something to
+  !> tell. Every rank must come here.
+  subroutine agree(self, ranks)
+    class(outcome_t), intent(inout) :: self
+    type(ranks_t),    intent(in)    :: ranks
+    integer :: numbers(2)
+
+    if (ranks%count == 1 .or. self%agreed) return
+    numbers(1) = merge(self%status + 1, 0, self%done)
+    numbers(2) = merge(ranks%count - ranks%mine, 0, self%errors%count() > 0)
+    call ranks%largest_numbers(numbers)
+    if (numbers(1) == 0) return
+    self%agreed = .true.
+    if (numbers(2) > 0) self%teller = ranks%count - numbers(2)
+    call self%end_with(numbers(1) - 1)
+  end subroutine agree
 
 end module pd_errors

@@ -5,6 +5,7 @@ module pd_kinds
   private
 
   public :: wp, i8, pi, unset, is_set, n_block, n_line, block_sum, block_dot
+  public :: ordered_sum
 
   integer, parameter :: wp = real64
   integer, parameter :: i8 = int64
@@ -60,5 +61,13 @@ contains
     block_dot = ((partial(1) + partial(5)) + (partial(2) + partial(6))) &
       + ((partial(3) + partial(7)) + (partial(4) + partial(8)))
   end function block_dot
+
+  !> Sum of numbers in their order, whatever made them: products that the caller has rounded already
+  !> are not rounded together with the sum.
+  pure real(wp) function ordered_sum(x)
+    real(wp), intent(in) :: x(:)
+
+    ordered_sum = sum(x)
+  end function ordered_sum
 
 end module pd_kinds

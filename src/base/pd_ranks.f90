@@ -1,26 +1,54 @@
 !> The ranks that share a run: one.
 !>
 !> Serial form. Everything that a sum, an extremum or a decision needs from other ranks goes through
-!> this module, so that a form with messages can take its place without a change elsewhere.
+!> this module. The form with messages is mpi/pd_ranks.f90; the Makefile chooses one of them.
 module pd_ranks
   use pd_kinds, only: wp
   implicit none
   private
 
-  public :: ranks_t
+  public :: ranks_t, begin_ranks, end_ranks, abort_ranks
 
-  !> The ranks of a run, numbered from 0.
+  !> The ranks of a run, numbered from 0. The blocks of a body are divided among them where `before`
+  !> is allocated; until then every rank has all of them.
   type :: ranks_t
     integer :: count = 1
     integer :: mine = 0
+    integer, allocatable :: before(:)   !! blocks before those of each rank, and all (0:count)
   contains
     procedure, nopass :: total
+    procedure, nopass :: running_total
     procedure, nopass :: largest
     procedure, nopass :: smallest
     procedure, nopass :: lowest_number
+    procedure, nopass :: gathered
+    procedure, nopass :: largest_numbers
+    procedure, nopass :: fill_in
+    procedure, nopass :: swap
+    procedure, nopass :: collect
+    procedure, nopass :: spread_out
   end type ranks_t
 
 contains
+
+  !> Begin: who takes part.
+  subroutine begin_ranks(ranks)
+    type(ranks_t), intent(out) :: ranks
+
+    ranks%mine = 0
+  end subroutine begin_ranks
+
+  !> End, all ranks together.
+  subroutine end_ranks()
+  end subroutine end_ranks
+
+  !> End all ranks from one of them, with an exit status.
+  subroutine abort_ranks(status)
+    integer, intent(in) :: status
+
+    associate (unused => status)
+    end associate
+  end subroutine abort_ranks
 
   !> Sum over the blocks of all ranks, in the order of the blocks of the whole body: the
   !> same bits for any number of ranks.
@@ -29,6 +57,13 @@ contains
 
     total = sum(parts)
   end function total
+
+  !> Sum over the rows of all ranks, row by row in the order of the whole body.
+  pure real(wp) function running_total(terms)
+    real(wp), intent(in) :: terms(:)   !! one number per row of this rank
+
+    running_total = sum(terms)
+  end function running_total
 
   !> Largest number of the blocks of all ranks; -huge if there are no blocks.
   pure real(wp) function largest(parts)
@@ -51,5 +86,60 @@ contains
     lowest = 0
     if (any(parts > 0)) lowest = minval(parts, mask=parts > 0)
   end function lowest_number
+
+  !> The numbers of the blocks of all ranks, in the order of the blocks.
+  pure function gathered(parts) result(all_parts)
+    real(wp), intent(in) :: parts(:)   !! one number per block of this rank
+    real(wp), allocatable :: all_parts(:)
+
+    all_parts = parts
+  end function gathered
+
+  !> The largest of every number on any rank.
+  pure subroutine largest_numbers(numbers)
+    integer, intent(inout) :: numbers(:)
+
+    associate (unchanged => numbers)
+    end associate
+  end subroutine largest_numbers
+
+  !> Numbers of which each is known to one rank, made known to all, bit by bit.
+  pure subroutine fill_in(numbers)
+    real(wp), intent(inout), contiguous :: numbers(:)   !! in: 0 but for those that are known here
+
+    associate (unchanged => numbers)
+    end associate
+  end subroutine fill_in
+
+  !> Send numbers to some ranks and receive others from them.
+  pure subroutine swap(partners, sent_ends, sent, received_ends, received)
+    integer,  intent(in)    :: partners(:)               !! ranks
+    integer,  intent(in)    :: sent_ends(0:)             !! last number for each; 0 before the first
+    integer,  intent(in)    :: received_ends(0:)         !! likewise
+    real(wp), intent(in),    contiguous :: sent(:)
+    real(wp), intent(inout), contiguous :: received(:)
+
+    associate (unused => partners, unused_ends => sent_ends, unused_others => received_ends, &
+      unused_numbers => sent, unchanged => received)
+    end associate
+  end subroutine swap
+
+  !> Columns of an array of which each is known to one rank, made known to rank 0.
+  pure subroutine collect(values, ends)
+    real(wp), intent(inout), contiguous :: values(:, :)
+    integer,  intent(in) :: ends(0:)   !! last column of each rank; ends(0): those before the first
+
+    associate (unused => ends, unchanged => values)
+    end associate
+  end subroutine collect
+
+  !> The same, made known to all ranks.
+  pure subroutine spread_out(values, ends)
+    real(wp), intent(inout), contiguous :: values(:, :)
+    integer,  intent(in) :: ends(0:)
+
+    associate (unused => ends, unchanged => values)
+    end associate
+  end subroutine spread_out
 
 end module pd_ranks

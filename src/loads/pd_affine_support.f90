@@ -4,9 +4,8 @@
 !>
 !> Source: doc/theory.md, section 7.
 module pd_affine_support
-  use pd_kinds, only: wp
+  use pd_kinds, only: ordered_sum, wp
   use pd_point_sets, only: point_set_t
-  use pd_ranks, only: ranks_t
   use pd_supports, only: reaction, support_t
   use pd_tables, only: table_t
   implicit none
@@ -78,14 +77,13 @@ contains
   pure subroutine take_reactions(self, volume, t, f)
     class(affine_support_t), intent(inout) :: self
     real(wp),                intent(in)    :: volume(:), t, f(:, :)
-    type(ranks_t) :: ranks
 
     associate (unused => t)
     end associate
     self%mode_force_before = self%mode_force
     self%force = reaction(self%points, volume, f)
     associate (p => self%points, m => self%mode)
-      self%mode_force = -ranks%total(volume(p) * (f(p, 1) * m(1, :) + f(p, 2) * m(2, :)))
+      self%mode_force = -ordered_sum(volume(p) * (f(p, 1) * m(1, :) + f(p, 2) * m(2, :)))
     end associate
   end subroutine take_reactions
 

@@ -4,9 +4,9 @@
 !>
 !> Source: doc/theory.md, section 7.
 module pd_body_force
-  use pd_kinds, only: wp
+  use pd_blocks, only: blocks_t, new_blocks
+  use pd_kinds, only: ordered_sum, wp
   use pd_loads, only: load_t
-  use pd_ranks, only: ranks_t
   use pd_tables, only: new_ramp, table_t
   use pd_text, only: short_number
   implicit none
@@ -22,11 +22,13 @@ module pd_body_force
     real(wp), allocatable, private :: volume(:)   !! V (n) [m^2]
     real(wp), private :: ramp_time = 0.0_wp       !! full load from then on [s]
     character(:), allocatable, private :: text    !! what it is
+    type(blocks_t), private :: blocks             !! of this rank
   contains
     procedure :: add_forces
     procedure :: work
     procedure :: description
     procedure :: acceleration
+    procedure :: divide
     procedure :: total
   end type body_force_t
 
@@ -47,6 +49,7 @@ contains
     load%text = text
     allocate (load%density(size(density, 1), 2), source=density)
     allocate (load%volume(size(volume)), source=volume)
+    load%blocks = new_blocks(1, size(volume))
     load%acts = [any(abs(density(:, 1)) > 0.0_wp), any(abs(density(:, 2)) > 0.0_wp)]
     load%ramp_time = ramp_time
     load%factor = new_ramp(ramp_time)
@@ -67,24 +70,27 @@ contains
     do c = 1, 2
       if (.not. self%acts(c)) cycle
       associate (density => self%density)
-        do i = 1, size(f, 1)
+        do i = self%blocks%first, self%blocks%last
           f(i, c) = f(i, c) + factor * density(i, c)
         end do
       end associate
     end do
   end subroutine add_forces
 
-  pure real(wp) function work(self, v, t, t_next)
+  !> The work of a force at all points is added row by row, from rank to rank.
+  real(wp) function work(self, v, t, t_next)
     class(body_force_t), intent(in) :: self
     real(wp),            intent(in) :: v(:, :), t, t_next
     real(wp) :: power
     integer  :: c
-    type(ranks_t) :: ranks
 
     power = 0.0_wp
-    do c = 1, 2
-      if (self%acts(c)) power = power + ranks%total(self%volume * self%density(:, c) * v(:, c))
-    end do
+    associate (a => self%blocks%first, b => self%blocks%last)
+      do c = 1, 2
+        if (self%acts(c)) power = power + self%blocks%running_total(self%volume(a:b) &
+          * self%density(a:b, c) * v(a:b, c))
+      end do
+    end associate
     work = (t_next - t) * (0.5_wp * (self%factor%rate(t) + self%factor%rate(t_next))) * power
   end function work
 
@@ -92,11 +98,18 @@ contains
   pure function total(self) result(force)
     class(body_force_t), intent(in) :: self
     real(wp) :: force(2)
-    type(ranks_t) :: ranks
 
-    force = [ranks%total(self%volume * self%density(:, 1)), &
-      ranks%total(self%volume * self%density(:, 2))]
+    force = [ordered_sum(self%volume * self%density(:, 1)), &
+      ordered_sum(self%volume * self%density(:, 2))]
   end function total
+
+  !> From now on this rank has its own blocks only.
+  pure subroutine divide(self, blocks)
+    class(body_force_t), intent(inout) :: self
+    type(blocks_t),      intent(in)    :: blocks
+
+    self%blocks = blocks
+  end subroutine divide
 
   pure function acceleration(self, t)
     class(body_force_t), intent(in) :: self

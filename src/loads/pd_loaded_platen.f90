@@ -8,9 +8,8 @@
 !> of its points.
 !> Source: doc/theory.md, section 7.
 module pd_loaded_platen
-  use pd_kinds, only: wp
+  use pd_kinds, only: ordered_sum, wp
   use pd_point_sets, only: point_set_t
-  use pd_ranks, only: ranks_t
   use pd_supports, only: reaction, support_t
   use pd_tables, only: new_ramp, table_t
   use pd_text, only: short_number
@@ -95,9 +94,8 @@ contains
     real(wp), intent(in)    :: force       !! on all of the points [N/m]
     real(wp), intent(in)    :: volume(:)   !! V (n) [m^2]
     real(wp), intent(inout) :: f(:)        !! one component (n) [N/m^3]
-    type(ranks_t) :: ranks
 
-    f(points) = (force + ranks%total(volume(points) * f(points))) / ranks%total(volume(points))
+    f(points) = (force + ordered_sum(volume(points) * f(points))) / ordered_sum(volume(points))
   end subroutine share
 
   !> - sum V f of the internal forces: f contains the applied force as well.

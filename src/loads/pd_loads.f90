@@ -5,6 +5,7 @@
 !> and do their work on v^{n+1/2}.
 !> Source: doc/theory.md, section 7.
 module pd_loads
+  use pd_blocks, only: blocks_t
   use pd_kinds, only: wp
   implicit none
   private
@@ -21,6 +22,8 @@ module pd_loads
     procedure(work),        deferred :: work
     procedure(description), deferred :: description
     procedure :: acceleration => no_acceleration
+    procedure :: mark_read => mark_nothing
+    procedure :: divide => nothing_to_divide
   end type load_t
 
   abstract interface
@@ -35,7 +38,7 @@ module pd_loads
     end subroutine add_forces
 
     !> Work from t to t_next, by the trapezoidal rule over the displacement of the step.
-    pure real(wp) function work(self, v, t, t_next)
+    real(wp) function work(self, v, t, t_next)
       import :: load_t, wp
       class(load_t), intent(in) :: self
       real(wp),      intent(in) :: v(:, :)         !! v^{n+1/2} (n,2) [m/s]
@@ -80,6 +83,24 @@ contains
     acceleration = 0.0_wp
   end function no_acceleration
 
+  !> Mark the points whose velocity the load looks at, where these are a few: here there are none.
+  pure subroutine mark_nothing(self, marked)
+    class(load_t), intent(in)    :: self
+    logical,       intent(inout) :: marked(:)      !! (n)
+
+    associate (unused => self, unchanged => marked)
+    end associate
+  end subroutine mark_nothing
+
+  !> From now on this rank has its own blocks only: a load on a few points takes no notice.
+  pure subroutine nothing_to_divide(self, blocks)
+    class(load_t),  intent(inout) :: self
+    type(blocks_t), intent(in)    :: blocks
+
+    associate (unchanged => self, unused => blocks)
+    end associate
+  end subroutine nothing_to_divide
+
   !> Number of loads.
   pure integer function number_of_loads(self) result(number)
     class(loads_t), intent(in) :: self
@@ -117,7 +138,7 @@ contains
   end subroutine add_all_forces
 
   !> Work of the loads from t to t_next.
-  pure real(wp) function work_of_all(self, v, t, t_next) result(work)
+  real(wp) function work_of_all(self, v, t, t_next) result(work)
     class(loads_t), intent(in) :: self
     real(wp),       intent(in) :: v(:, :)          !! v^{n+1/2} (n,2) [m/s]
     real(wp),       intent(in) :: t, t_next        !! [s]

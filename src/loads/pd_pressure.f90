@@ -10,11 +10,10 @@ module pd_pressure
   use pd_doubt_list, only: doubt_kinds, kind_number
   use pd_edge_weights, only: edge_weights_t
   use pd_edges, only: edge_t
-  use pd_kinds, only: wp
+  use pd_kinds, only: ordered_sum, wp
   use pd_loads, only: load_t
   use pd_operators, only: operators_t
   use pd_point_sets, only: side_t
-  use pd_ranks, only: ranks_t
   use pd_tables, only: new_ramp, table_t
   use pd_text, only: integer_text, short_number
   implicit none
@@ -37,6 +36,7 @@ module pd_pressure
     procedure :: add_forces
     procedure :: work
     procedure :: description
+    procedure :: mark_read
   end type pressure_t
 
   !> The surface of the body, for pressures.
@@ -303,9 +303,8 @@ contains
     class(pressure_t), intent(in) :: self
     real(wp),          intent(in) :: v(:, :), t, t_next
     real(wp) :: power
-    type(ranks_t) :: ranks
 
-    power = ranks%total(self%force(:, 1) * v(self%points, 1) &
+    power = ordered_sum(self%force(:, 1) * v(self%points, 1) &
       + self%force(:, 2) * v(self%points, 2))
     work = (t_next - t) * (0.5_wp * (self%factor%rate(t) + self%factor%rate(t_next))) * power
   end function work
@@ -321,5 +320,12 @@ contains
       short_number(norm2(sum(self%force, dim=1)))//' N/m in all'
     if (self%ramp_time > 0.0_wp) text = text//', whole from '//short_number(self%ramp_time)//' s'
   end function description
+
+  pure subroutine mark_read(self, marked)
+    class(pressure_t), intent(in)    :: self
+    logical,           intent(inout) :: marked(:)
+
+    marked(self%points) = .true.
+  end subroutine mark_read
 
 end module pd_pressure

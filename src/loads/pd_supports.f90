@@ -4,8 +4,7 @@
 !> and a line in `pd_setup_loads`.
 !> Source: doc/theory.md, section 7.
 module pd_supports
-  use pd_kinds, only: wp
-  use pd_ranks, only: ranks_t
+  use pd_kinds, only: ordered_sum, wp
   use pd_tables, only: table_t
   implicit none
   private
@@ -24,6 +23,7 @@ module pd_supports
     procedure(take_reactions),  deferred :: take_reactions
     procedure(work),            deferred :: work
     procedure :: share_forces => share_nothing
+    procedure :: mark_read => mark_points
     procedure :: common_velocity => no_common_velocity
     procedure :: applied => nothing_applied
     procedure :: description => nothing_to_say
@@ -92,10 +92,9 @@ contains
     real(wp), intent(in) :: volume(:)                 !! V (n) [m^2]
     real(wp), intent(in) :: f(:, :)                   !! (n,2) [N/m^3]
     real(wp) :: force(2)
-    type(ranks_t) :: ranks
 
-    force(1) = -ranks%total(volume(points) * f(points, 1))
-    force(2) = -ranks%total(volume(points) * f(points, 2))
+    force(1) = -ordered_sum(volume(points) * f(points, 1))
+    force(2) = -ordered_sum(volume(points) * f(points, 2))
   end function reaction
 
   ! --- defaults, right for most supports
@@ -110,6 +109,14 @@ contains
     associate (unused => self, unused_volume => volume, unused_t => t, unchanged => f)
     end associate
   end subroutine share_nothing
+
+  !> Mark the points whose displacement, velocity or force the support looks at: its own.
+  pure subroutine mark_points(self, marked)
+    class(support_t), intent(in)    :: self
+    logical,          intent(inout) :: marked(:)      !! (n)
+
+    marked(self%points) = .true.
+  end subroutine mark_points
 
   !> Velocity that the support prescribes for component c of all its points; a table without times
   !> if there is no such velocity.

@@ -26,7 +26,7 @@ module pd_forces
 contains
 
   !> Forces at time t: internal ones, loads, and the reactions of the supports. Stress and history
-  !> of the state go from step n to n+1.
+  !> of the state go from step n to n+1. What supports and loads look at is then known to all ranks.
   !>
   !> `work`: what each block has dissipated in this step.
   !> `failed_row`: 0, or the first row whose det F is not positive (NaN included).
@@ -43,6 +43,7 @@ contains
       call internal_forces(model%operators, model%materials, points%volume, state, work, timing, &
         failed_row)
       call model%loads%add_forces(points%volume, t, state%force)
+      call model%shared%bring_both(state%force, state%velocity)
       call model%supports%share_forces(points%volume, t, state%force)
       call model%supports%take_reactions(points%volume, t, state%force)
     end associate
@@ -147,7 +148,8 @@ contains
     integer  :: block, lo, hi, n_blocks
 
     n_blocks = operators%domain%blocks%count
-    allocate (next%h(operators%n, 4), next%p(operators%n, 4), source=0.0_wp)
+    call operators%domain%make_room(operators%n, 4, next%h)
+    call operators%domain%make_room(operators%n, 4, next%p)
     call operators%take_in(state%velocity, operators%mirror%rate)
     !$omp parallel do schedule(static) default(none) private(block, lo, hi, p) &
     !$omp shared(n_blocks, operators, materials, time_step, state, next)

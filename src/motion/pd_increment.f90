@@ -155,6 +155,7 @@ contains
     if (allocated(model%operators%relaxing)) call model%operators%relaxing%follow(0.0_wp)
     call forces(model, t + duration, state, relaxation%blocks, timing, failed_row)
     state%velocity = (state%displacement - relaxation%displacement) / duration
+    call model%shared%bring(state%velocity)
   end subroutine settle
 
   !> Work of the increment. That of supports and loads follows from the forces at both ends; what
@@ -181,7 +182,7 @@ contains
     end do
     ledger%outer_work = ledger%outer_work + model%loads%work(state%velocity, t, t + clock%time_step)
     ledger%damping = ledger%damping + increments%last%work
-    ledger%damping(1) = ledger%damping(1) + beyond
+    if (model%blocks%has_first()) ledger%damping(1) = ledger%damping(1) + beyond
     call increments%jump%see(clock%step, model%blocks%total(increments%last%work) + beyond)
     ledger%plastic = ledger%plastic + increments%relaxation%blocks%dissipated
     ledger%control = ledger%control + increments%relaxation%blocks%relaxed

@@ -27,6 +27,7 @@ module pd_ledger
     procedure :: external_work
     procedure :: note_work
     procedure :: fit
+    procedure :: gathered
   end type ledger_t
 
 contains
@@ -40,7 +41,7 @@ contains
   end function new_ledger
 
   !> Dissipated by plastic flow so far [J/m].
-  pure real(wp) function plastic_dissipation(self, blocks)
+  real(wp) function plastic_dissipation(self, blocks)
     class(ledger_t), intent(in) :: self
     type(blocks_t),  intent(in) :: blocks
 
@@ -48,7 +49,7 @@ contains
   end function plastic_dissipation
 
   !> Dissipated by the relaxing control so far [J/m].
-  pure real(wp) function control_dissipation(self, blocks)
+  real(wp) function control_dissipation(self, blocks)
     class(ledger_t), intent(in) :: self
     type(blocks_t),  intent(in) :: blocks
 
@@ -56,7 +57,7 @@ contains
   end function control_dissipation
 
   !> Dissipated by the damping so far [J/m].
-  pure real(wp) function damping_dissipation(self, blocks)
+  real(wp) function damping_dissipation(self, blocks)
     class(ledger_t), intent(in) :: self
     type(blocks_t),  intent(in) :: blocks
 
@@ -64,33 +65,57 @@ contains
   end function damping_dissipation
 
   !> Work from outside so far, W [J/m].
-  pure real(wp) function external_work(self, blocks)
+  real(wp) function external_work(self, blocks)
     class(ledger_t), intent(in) :: self
     type(blocks_t),  intent(in) :: blocks
 
     external_work = self%outer_work + blocks%total(self%frame_work)
   end function external_work
 
-  !> Fit the sums to a division into blocks: those of another division go into the first block.
+  !> Fit the sums of all blocks to a division into blocks: each rank keeps those of its own. Those
+  !> of another division go into the first block.
   pure subroutine fit(self, blocks)
-    class(ledger_t), intent(inout) :: self
+    class(ledger_t), intent(inout) :: self   !! in: with the blocks of all ranks
     type(blocks_t),  intent(in)    :: blocks
-    type(ledger_t) :: fitting
 
-    if (size(self%plastic) == blocks%count) return
-    fitting = new_ledger(blocks)
-    fitting%plastic(1) = sum(self%plastic)
-    fitting%control(1) = sum(self%control)
-    fitting%damping(1) = sum(self%damping)
-    fitting%frame_work(1) = sum(self%frame_work)
-    self%plastic = fitting%plastic
-    self%control = fitting%control
-    self%damping = fitting%damping
-    self%frame_work = fitting%frame_work
+    call fit_sums(self%plastic, blocks)
+    call fit_sums(self%control, blocks)
+    call fit_sums(self%damping, blocks)
+    call fit_sums(self%frame_work, blocks)
   end subroutine fit
 
+  pure subroutine fit_sums(sums, blocks)
+    real(wp), allocatable, intent(inout) :: sums(:)   !! (blocks)
+    type(blocks_t),        intent(in)    :: blocks
+    real(wp), allocatable :: fitting(:)
+
+    if (size(sums) == blocks%count_of_all()) then
+      fitting = sums(blocks%offset + 1:blocks%offset + blocks%count)
+    else
+      allocate (fitting(blocks%count), source=0.0_wp)
+      if (blocks%has_first()) fitting(1) = sum(sums)
+    end if
+    call move_alloc(fitting, sums)
+  end subroutine fit_sums
+
+  !> The sums of the blocks of all ranks.
+  function gathered(self, blocks) result(ledger)
+    class(ledger_t), intent(in) :: self
+    type(blocks_t),  intent(in) :: blocks
+    type(ledger_t) :: ledger
+
+    ledger%initial_kinetic_energy = self%initial_kinetic_energy
+    ledger%initial_strain_energy = self%initial_strain_energy
+    ledger%largest_work = self%largest_work
+    ledger%outer_work = self%outer_work
+    allocate (ledger%plastic, source=blocks%ranks%gathered(self%plastic))
+    allocate (ledger%control, source=blocks%ranks%gathered(self%control))
+    allocate (ledger%damping, source=blocks%ranks%gathered(self%damping))
+    allocate (ledger%frame_work, source=blocks%ranks%gathered(self%frame_work))
+  end function gathered
+
   !> Remember the largest work so far.
-  pure subroutine note_work(self, blocks)
+  subroutine note_work(self, blocks)
     class(ledger_t), intent(inout) :: self
     type(blocks_t),  intent(in)    :: blocks
 

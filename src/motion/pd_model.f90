@@ -8,6 +8,7 @@ module pd_model
   use pd_operators, only: operators_t
   use pd_platens, only: platens_t, reference_ends
   use pd_points, only: points_t, probe_t
+  use pd_shared_rows, only: shared_rows_t
   use pd_state, only: state_t
   use pd_storage, only: storage_t
   use pd_supports, only: supports_t
@@ -33,7 +34,9 @@ module pd_model
     type(storage_t)   :: shown               !! rows of the points that results show
     class(operators_t), allocatable :: operators
     type(materials_t) :: materials
-    type(blocks_t)    :: blocks              !! of the rows of all fields
+    type(blocks_t)    :: blocks              !! of the rows of all fields; those of this rank
+    type(shared_rows_t) :: shared            !! rows that supports and loads look at
+    type(shared_rows_t) :: probed            !! those of the probes
     type(points_t)    :: points
     type(platens_t)   :: platens
     type(supports_t)  :: supports
@@ -93,24 +96,29 @@ contains
     type(model_t), intent(inout) :: model
     type(state_t), intent(out)   :: state
     type(damping_frame_t) :: frame
-    integer :: k
+    integer :: k, kept(2)
 
+    kept = model%operators%domain%kept(size(model%points%volume))
     state%in_stages = model%whole%n > 0
     state%has_initial_strain = allocated(model%initial) .or. state%in_stages
-    call state%allocate(size(model%points%volume), model%materials%remembered())
-    if (allocated(model%initial)) then
-      state%initial_strain = model%initial%strain
-      state%stress = model%initial%stress
-      state%force = model%initial%force
-    end if
-    state%strength = model%strength
+    call state%allocate(size(model%points%volume), model%materials%remembered(), kept)
     frame = damping_frame(model, 0.0_wp)
-    do k = 1, 2
-      state%velocity(:, k) = frame%lower(k) + (frame%upper(k) - frame%lower(k)) * model%points%place
-      where (model%points%volume <= 0.0_wp) state%velocity(:, k) = 0.0_wp
-    end do
+    associate (a => kept(1), b => kept(2))
+      if (allocated(model%initial)) then
+        state%initial_strain(a:b, :) = model%initial%strain(a:b, :)
+        state%stress(a:b, :) = model%initial%stress(a:b, :)
+        state%force(a:b, :) = model%initial%force(a:b, :)
+      end if
+      state%strength(a:b) = model%strength(a:b)
+      do k = 1, 2
+        state%velocity(a:b, k) = frame%lower(k) + (frame%upper(k) - frame%lower(k)) &
+          * model%points%place(a:b)
+        where (model%points%volume(a:b) <= 0.0_wp) state%velocity(a:b, k) = 0.0_wp
+      end do
+    end associate
     call model%supports%prescribe(0.0_wp, state%displacement, state%velocity)
     call model%loads%add_forces(model%points%volume, 0.0_wp, state%force)
+    call model%shared%bring(state%force)
     call model%supports%share_forces(model%points%volume, 0.0_wp, state%force)
     if (allocated(model%initial)) &   ! the body leans on them from the start
       call model%supports%take_reactions(model%points%volume, 0.0_wp, state%force)

@@ -18,6 +18,7 @@ module pd_reversal
   !> Plastic heat so far [J/m], and the part of it that was made in flow that has turned back.
   type :: reversal_t
     real(wp) :: flowed = 0.0_wp, turned = 0.0_wp
+    logical, private :: possible = .false.               !! some block softens
     logical,  allocatable, private :: softens(:)         !! of the blocks: all that flows in it does
     real(wp), allocatable, private :: work(:), heat(:)   !! of the blocks, at the last look [J/m]
   contains
@@ -30,7 +31,7 @@ contains
 
   !> Nothing seen yet. `kinematic`: of the materials of the input, whether
   !> their softening is.
-  pure type(reversal_t) function new_reversal(materials, kinematic, blocks) result(reversal)
+  type(reversal_t) function new_reversal(materials, kinematic, blocks) result(reversal)
     type(materials_t), intent(in) :: materials
     logical,           intent(in) :: kinematic(:)
     type(blocks_t),    intent(in) :: blocks
@@ -47,13 +48,14 @@ contains
       reversal%softens(block) = any(turns_back(here)) .and. all(turns_back(here) &
         .or. .not. flows(here))
     end do
+    reversal%possible = blocks%lowest_number(merge(1, 0, reversal%softens)) > 0
   end function new_reversal
 
   !> Whether there is anything to look at.
   pure logical function is_possible(self)
     class(reversal_t), intent(in) :: self
 
-    is_possible = any(self%softens)
+    is_possible = self%possible
   end function is_possible
 
   !> Look at the flow since the last look. A block counts with all of its flow, or not.

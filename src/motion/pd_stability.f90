@@ -6,6 +6,7 @@ module pd_stability
   use pd_forces, only: linear_forces, next_step_t, prepare_next_step
   use pd_kinds, only: block_sum, n_block, wp
   use pd_model, only: model_t
+  use pd_pages, only: forget_rows
   use pd_state, only: state_t
   implicit none
   private
@@ -75,28 +76,35 @@ contains
     real(wp) :: diagonal(most_iterations), off_diagonal(0:most_iterations)
     real(wp) :: ritz(0:most_iterations)
     real(wp) :: tolerance
-    integer  :: k, n, look_back
+    integer  :: k, n, look_back, kept(2)
 
     look_back = merge(5, 10, present(state))
     tolerance = merge(1.0e-2_wp, 3.0e-3_wp, present(state))
     n = size(model%points%volume)
-    allocate (q(n, 2), r(n, 2), q_old(n, 2), h(n, 4), source=0.0_wp)
+    kept = model%operators%domain%kept(n)
+    call model%operators%domain%make_room(n, 4, h)
+    call model%operators%domain%make_room(n, 2, q)
+    call model%operators%domain%make_room(n, 2, r)
+    call model%operators%domain%make_room(n, 2, q_old)
     allocate (density(n), source=model%materials%density_of(n))
     ! with weights of this size q has the size of a spacing, and its gradient that of 1
     allocate (volume(n), source=model%points%volume &
       / (sum(model%points%volume) * maxval(model%points%volume)))
     allocate (mass(n), source=volume * (density / model%materials%list(1)%density))
+    call forget_rows(density, kept)
+    call forget_rows(volume, kept)
+    call forget_rows(mass, kept)
     associate (free => model%points%free, blocks => model%blocks, &
       reference => model%materials%list(1)%density)
-      call scatter(model%points%volume, free, q)
+      call scatter(model%points%volume, free, kept, q)
       off_diagonal(0) = 0.0_wp
       ritz = 0.0_wp
-      call scale_to(1.0_wp / sqrt(product_of(blocks, mass, q, q, free)), q)
+      call scale_to(1.0_wp / sqrt(product_of(blocks, mass, q, q, free)), blocks, q)
       do k = 1, most_iterations
         iterations = k
         call linear_forces(model%operators, model%materials, q, h, r, state, next)
         diagonal(k) = -product_of(blocks, volume, q, r, free) / reference
-        call combine(density, free, r, -diagonal(k), q, -off_diagonal(k - 1), q_old)
+        call combine(blocks, density, free, r, -diagonal(k), q, -off_diagonal(k - 1), q_old)
         off_diagonal(k) = sqrt(product_of(blocks, mass, r, r, free))
         ritz(k) = largest_eigenvalue(diagonal(:k), off_diagonal(1:k - 1))
         if (ritz(k) - ritz(max(0, k - look_back)) <= tolerance * ritz(k)) exit
@@ -105,7 +113,7 @@ contains
         call move_alloc(q, q_old)
         call move_alloc(r, q)
         call move_alloc(spare, r)
-        call scale_to(1.0_wp / off_diagonal(k), q)
+        call scale_to(1.0_wp / off_diagonal(k), blocks, q)
       end do
     end associate
     frequency = sqrt(max(0.0_wp, ritz(iterations) &
@@ -115,29 +123,32 @@ contains
 
   !> A vector with every frequency in it: the same pseudo-random numbers in every run,
   !> whether or not there are rows without a point (volume 0).
-  subroutine scatter(volume, free, q)
-    real(wp), intent(in)  :: volume(:), free(:, :)
-    real(wp), intent(out) :: q(:, :)
+  subroutine scatter(volume, free, kept, q)
+    real(wp), intent(in)    :: volume(:), free(:, :)
+    integer,  intent(in)    :: kept(2)   !! first and last row that is needed
+    real(wp), intent(inout) :: q(:, :)
     real(wp), parameter :: golden = 0.6180339887498949_wp, silver = 0.4142135623730951_wp
     real(wp) :: x(2)
     integer  :: i, number
 
     number = 0
-    do i = 1, size(q, 1)
+    do i = 1, kept(2)
       if (volume(i) > 0.0_wp) number = number + 1
+      if (i < kept(1)) cycle
       x = real(number, wp)**2 * [golden, silver]
       q(i, :) = free(i, :) * (x - aint(x) - 0.5_wp)
     end do
   end subroutine scatter
 
   !> q <- factor q.
-  subroutine scale_to(factor, q)
-    real(wp), intent(in) :: factor
+  subroutine scale_to(factor, blocks, q)
+    real(wp),       intent(in) :: factor
+    type(blocks_t), intent(in) :: blocks
     real(wp), intent(inout), contiguous :: q(:, :)
     integer :: i
 
-    !$omp parallel do schedule(static) default(none) shared(factor, q) private(i)
-    do i = 1, size(q, 1)
+    !$omp parallel do schedule(static) default(none) shared(factor, blocks, q) private(i)
+    do i = blocks%first, blocks%last
       q(i, 1) = factor * q(i, 1)
       q(i, 2) = factor * q(i, 2)
     end do
@@ -145,7 +156,8 @@ contains
   end subroutine scale_to
 
   !> r <- -free r / rho + b q + c p.
-  subroutine combine(density, free, r, b, q, c, p)
+  subroutine combine(blocks, density, free, r, b, q, c, p)
+    type(blocks_t), intent(in) :: blocks
     real(wp), intent(in) :: b, c
     real(wp), intent(in),    contiguous :: density(:)                     !! rho (n) [kg/m^3]
     real(wp), intent(in),    contiguous :: free(:, :), q(:, :), p(:, :)   !! (n,2)
@@ -154,8 +166,8 @@ contains
     integer  :: i
 
     !$omp parallel do schedule(static) default(none) private(i, a) &
-    !$omp shared(density, b, c, free, r, q, p)
-    do i = 1, size(q, 1)
+    !$omp shared(blocks, density, b, c, free, r, q, p)
+    do i = blocks%first, blocks%last
       a = -1.0_wp / density(i)
       r(i, 1) = a * free(i, 1) * r(i, 1) + b * q(i, 1) + c * p(i, 1)
       r(i, 2) = a * free(i, 2) * r(i, 2) + b * q(i, 2) + c * p(i, 2)

@@ -7,6 +7,7 @@ module pd_state
   use pd_kinds, only: wp
   use pd_labels, only: label_t
   use pd_law, only: law_points_t
+  use pd_pages, only: forget_rows
   implicit none
   private
 
@@ -28,6 +29,7 @@ module pd_state
     procedure :: visit
     procedure :: allocate => allocate_state
     procedure :: scatter
+    procedure :: forget
     procedure :: numbers_per_point
   end type state_t
 
@@ -43,6 +45,22 @@ module pd_state
   contains
     procedure :: fit
   end type block_work_t
+
+  !> Make room for unloaded points, with memory for some rows only.
+  type, extends(allocating_t) :: room_t
+    integer :: kept(2) = 0              !! first and last of these rows
+  contains
+    procedure :: one_number => room_1
+    procedure :: several_numbers => room_2
+  end type room_t
+
+  !> Forget all rows but some.
+  type, extends(field_visitor_t) :: forgetting_t
+    integer :: kept(2) = 0
+  contains
+    procedure :: one_number => forget_1
+    procedure :: several_numbers => forget_2
+  end type forgetting_t
 
 contains
 
@@ -89,16 +107,67 @@ contains
   end subroutine visit
 
   !> The unloaded state of n rows.
-  subroutine allocate_state(self, n, remembered)
+  subroutine allocate_state(self, n, remembered, kept)
     class(state_t), intent(inout) :: self
     integer,        intent(in)    :: n
     type(label_t),  intent(in)    :: remembered(:)   !! columns of the history
-    type(allocating_t) :: room
+    integer, optional, intent(in) :: kept(2)         !! first and last row that is needed here
+    type(room_t) :: room
 
     self%remembered = remembered
     room%n = n
+    room%kept = [1, n]
+    if (present(kept)) room%kept = kept
     call self%visit(room)
   end subroutine allocate_state
+
+  subroutine room_1(self, about, values)
+    class(room_t),         intent(inout) :: self
+    type(state_field_t),   intent(in)    :: about
+    real(wp), allocatable, intent(inout) :: values(:)
+
+    call self%allocating_t%one_number(about, values)
+    call forget_rows(values, self%kept)
+  end subroutine room_1
+
+  subroutine room_2(self, about, values)
+    class(room_t),         intent(inout) :: self
+    type(state_field_t),   intent(in)    :: about
+    real(wp), allocatable, intent(inout) :: values(:, :)
+
+    call self%allocating_t%several_numbers(about, values)
+    call forget_rows(values, self%kept)
+  end subroutine room_2
+
+  !> Keep nothing but these rows; the others are zero, or what they were.
+  subroutine forget(self, kept)
+    class(state_t), intent(inout) :: self
+    integer,        intent(in)    :: kept(2)
+    type(forgetting_t) :: forgetting
+
+    forgetting%kept = kept
+    call self%visit(forgetting)
+  end subroutine forget
+
+  subroutine forget_1(self, about, values)
+    class(forgetting_t),   intent(inout) :: self
+    type(state_field_t),   intent(in)    :: about
+    real(wp), allocatable, intent(inout) :: values(:)
+
+    associate (unused => about)
+    end associate
+    call forget_rows(values, self%kept)
+  end subroutine forget_1
+
+  subroutine forget_2(self, about, values)
+    class(forgetting_t),   intent(inout) :: self
+    type(state_field_t),   intent(in)    :: about
+    real(wp), allocatable, intent(inout) :: values(:, :)
+
+    associate (unused => about)
+    end associate
+    call forget_rows(values, self%kept)
+  end subroutine forget_2
 
   !> The state of n rows from that of some of them; the others are unloaded and at rest.
   subroutine scatter(self, rows, n)

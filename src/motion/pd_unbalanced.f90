@@ -106,7 +106,7 @@ contains
   end function loads_at
 
   !> sum V (|f_x| + |f_y|), block by block: the same bits for any number of threads.
-  pure real(wp) function sum_of_absolute(blocks, volume, f) result(whole)
+  real(wp) function sum_of_absolute(blocks, volume, f) result(whole)
     type(blocks_t), intent(in) :: blocks
     real(wp), intent(in), contiguous :: volume(:), f(:, :)
     real(wp) :: parts(blocks%count)

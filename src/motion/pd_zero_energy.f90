@@ -20,8 +20,8 @@ contains
   !> included, nothing has flowed; z is the field `zero_energy`, |E| the norm of the strain. Not a
   !> number where such points are a hundredth of the body or less, or hardly strained.
   real(wp) function zero_energy_ratio(model, state) result(ratio)
-    type(model_t), intent(in) :: model
-    type(state_t), intent(in) :: state
+    type(model_t), intent(inout) :: model   !! its halo is a work space
+    type(state_t), intent(in)    :: state
     real(wp), parameter :: tiny_strain = 1.0e-9_wp, enough = 0.01_wp
     real(wp), allocatable :: z2(:), flowed(:), parts(:, :)
     real(wp) :: sums(4)
@@ -46,14 +46,14 @@ contains
   !> A field that is 1 where a point has flowed has a zero-energy part, over H = 0, of exactly the
   !> weight of those neighbours that differ.
   subroutine look_for_flow(model, state, flowed)
-    type(model_t), intent(in) :: model
-    type(state_t), intent(in) :: state
+    type(model_t), intent(inout) :: model
+    type(state_t), intent(in)    :: state
     real(wp), allocatable, intent(out) :: flowed(:)   !! 0 to 2 (n)
     real(wp), allocatable :: mark(:, :), h(:, :)
     real(wp) :: alpha(n_block)
     integer  :: block
 
-    allocate (flowed(model%operators%n))
+    allocate (flowed(model%operators%n), source=0.0_wp)
     allocate (mark(model%operators%n, 2), h(model%operators%n, 4), source=0.0_wp)
     do block = 1, model%blocks%count
       associate (lo => model%blocks%lo(block), hi => model%blocks%hi(block))
@@ -61,6 +61,7 @@ contains
         where (alpha(:hi - lo + 1) > 0.0_wp) mark(lo:hi, 1) = 1.0_wp
       end associate
     end do
+    call model%operators%domain%halo%exchange(mark)
     call model%operators%zero_energy_squared(mark, h, flowed)
     where (model%operators%weight_sum > 0.0_wp) flowed = flowed / model%operators%weight_sum
     flowed = flowed + mark(:, 1)

@@ -105,6 +105,7 @@ contains
       end do
     end do
     !$omp end parallel do
+    call self%domain%halo%exchange(self%affine)
   end subroutine take_in
 
   !> G[u] of rows lo to hi with the plain weights, omega V_j xi.

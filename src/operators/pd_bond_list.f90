@@ -36,6 +36,7 @@ module pd_bond_list
     procedure :: bonds
     procedure :: fewest_bonds
     procedure :: memory
+    procedure :: needed_rows
   end type bond_list_t
 
 contains
@@ -327,7 +328,7 @@ contains
 
     !$omp parallel do schedule(static) default(none) private(i, j, b, xi, z) &
     !$omp shared(self, u, h, z2)
-    do i = 1, self%n
+    do i = self%domain%blocks%first, self%domain%blocks%last
       z2(i) = 0.0_wp
       associate (x => self%position)
         do b = self%first(i), self%first(i + 1) - 1
@@ -374,5 +375,20 @@ contains
     if (allocated(self%relaxing)) &
       memory = memory + real(self%bonds(), wp) * 8.0_wp + real(self%n, wp) * 64.0_wp
   end function memory
+
+  !> Rows that the families of rows `first` to `last` read.
+  pure function needed_rows(self, first, last) result(rows)
+    class(bond_list_t), intent(in) :: self
+    integer, intent(in)  :: first, last
+    integer, allocatable :: rows(:)
+    logical, allocatable :: needed(:)
+    integer :: i
+
+    allocate (needed(self%n), source=.false.)
+    do i = first, last
+      needed(self%neighbour(self%first(i):self%first(i + 1) - 1)) = .true.
+    end do
+    rows = pack([(i, i=1, self%n)], needed)
+  end function needed_rows
 
 end module pd_bond_list

@@ -1,33 +1,102 @@
-!> Rows of a field that families read and that another rank owns.
+!> Rows of a field that families read and that other ranks own: the halo of the rows of this rank.
 !>
-!> Serial form: what would be a message is a copy from row to row, and a rank that owns all rows
-!> makes none. The operators bring every field up to date once it is whole, and before a family
-!> reads it, so that a form with messages can replace this one.
+!> The operators bring every field up to date once it is whole, and before a family reads it.
 module pd_halo
   use pd_kinds, only: wp
+  use pd_ranks, only: ranks_t
   implicit none
   private
 
   public :: halo_t
 
-  !> Rows that are copied, and where to; size 0: this rank owns every row.
+  !> For each of some other ranks, which rows it needs of this one and which this one needs of it;
+  !> no partners: this rank owns every row that it reads.
   type :: halo_t
-    integer, allocatable :: from(:), to(:)
+    type(ranks_t), private :: ranks
+    integer, allocatable :: partners(:)
+    integer, allocatable :: sent(:), received(:)             !! rows, partner by partner
+    integer, allocatable :: sent_ends(:), received_ends(:)   !! last of each; 0: before them (0:)
+    real(wp), allocatable, private :: outbox(:), inbox(:)
   contains
+    procedure :: meet
     procedure :: exchange
   end type halo_t
 
 contains
 
-  !> Bring the rows of the halo up to date.
-  pure subroutine exchange(self, field)
-    class(halo_t), intent(in) :: self
-    real(wp), intent(inout), contiguous :: field(:, :)   !! (rows, components)
-    integer :: k
+  !> Exchange rows with one more rank from now on.
+  pure subroutine meet(self, ranks, partner, sent, received)
+    class(halo_t), intent(inout) :: self
+    type(ranks_t), intent(in)    :: ranks
+    integer,       intent(in)    :: partner
+    integer,       intent(in)    :: sent(:), received(:)   !! rows, in the order that it expects
 
-    do k = 1, size(self%from)
-      field(self%to(k), :) = field(self%from(k), :)
+    self%ranks = ranks
+    if (.not. allocated(self%partners)) then
+      allocate (self%partners(0), self%sent(0), self%received(0))
+      allocate (self%sent_ends(0:0), self%received_ends(0:0), source=0)
+    end if
+    if (size(sent) + size(received) == 0) return
+    self%partners = [self%partners, partner]
+    self%sent = [self%sent, sent]
+    self%received = [self%received, received]
+    call append_end(self%sent_ends, size(self%sent))
+    call append_end(self%received_ends, size(self%received))
+  end subroutine meet
+
+  pure subroutine append_end(ends, last)
+    integer, allocatable, intent(inout) :: ends(:)   !! from 0
+    integer,              intent(in)    :: last
+    integer, allocatable :: longer(:)
+
+    allocate (longer(0:size(ends)))
+    longer(:size(ends) - 1) = ends
+    longer(size(ends)) = last
+    call move_alloc(longer, ends)
+  end subroutine append_end
+
+  !> Bring the rows of the halo up to date.
+  subroutine exchange(self, field)
+    class(halo_t), intent(inout) :: self
+    real(wp), intent(inout), contiguous :: field(:, :)   !! (rows, components)
+    integer :: c, k, n, width
+
+    if (.not. allocated(self%partners)) return
+    width = size(field, 2)
+    call make_room(self%outbox, width * size(self%sent))
+    call make_room(self%inbox, width * size(self%received))
+    do k = 1, size(self%partners)
+      n = width * self%sent_ends(k - 1)
+      associate (rows => self%sent(self%sent_ends(k - 1) + 1:self%sent_ends(k)))
+        do c = 1, width
+          self%outbox(n + 1:n + size(rows)) = field(rows, c)
+          n = n + size(rows)
+        end do
+      end associate
+    end do
+    call self%ranks%swap(self%partners, width * self%sent_ends, self%outbox, &
+      width * self%received_ends, self%inbox)
+    do k = 1, size(self%partners)
+      n = width * self%received_ends(k - 1)
+      associate (rows => self%received(self%received_ends(k - 1) + 1:self%received_ends(k)))
+        do c = 1, width
+          field(rows, c) = self%inbox(n + 1:n + size(rows))
+          n = n + size(rows)
+        end do
+      end associate
     end do
   end subroutine exchange
+
+  !> Make room for n numbers; it stays for the next time.
+  subroutine make_room(box, n)
+    real(wp), allocatable, intent(inout) :: box(:)
+    integer,               intent(in)    :: n
+
+    if (allocated(box)) then
+      if (size(box) >= n) return
+      deallocate (box)
+    end if
+    allocate (box(n), source=0.0_wp)
+  end subroutine make_room
 
 end module pd_halo

@@ -8,7 +8,9 @@
 !> body alone, and the second line makes forces its derivative.
 !> Source: doc/theory.md, section 7.
 module pd_mirror
+  use pd_blocks, only: blocks_t
   use pd_kinds, only: wp
+  use pd_shared_rows, only: new_shared_rows, shared_rows_t
   implicit none
   private
 
@@ -25,9 +27,12 @@ module pd_mirror
     integer, allocatable :: normal(:)               !! axis of every plane; 1: x, 2: y
     real(wp), allocatable :: place(:)               !! U of every plane [m]
     real(wp), allocatable :: rate(:)                !! dU/dt of every plane [m/s]
+    type(shared_rows_t), private :: origins         !! known to all ranks: what has images
+    type(shared_rows_t), private :: both            !! that and the images
   contains
     procedure :: moves_with
     procedure :: rows
+    procedure :: divide
     procedure :: reflect_motion
     procedure :: hand_back
     procedure :: carry
@@ -82,14 +87,30 @@ contains
     if (self%n > 0) rows = self%row
   end function rows
 
+  !> From now on this rank has its own blocks only. Every rank reflects all images, from rows that
+  !> are made known to it.
+  pure subroutine divide(self, blocks)
+    class(mirror_t), intent(inout) :: self
+    type(blocks_t),  intent(in)    :: blocks
+    logical, allocatable :: marked(:)
+
+    if (self%n == 0) return
+    allocate (marked(blocks%ends(2)), source=.false.)
+    marked(self%origin) = .true.
+    self%origins = new_shared_rows(marked, blocks)
+    marked(self%row) = .true.
+    self%both = new_shared_rows(marked, blocks)
+  end subroutine divide
+
   !> A vector field, such as a displacement, at the images; `moved` is what the planes do of the
   !> same kind, absent: nothing.
-  pure subroutine reflect_motion(self, field, moved)
-    class(mirror_t), intent(in) :: self
+  subroutine reflect_motion(self, field, moved)
+    class(mirror_t), intent(inout) :: self
     real(wp), intent(inout), contiguous :: field(:, :)   !! (rows,2)
     real(wp), intent(in), optional :: moved(:)           !! along the normals (planes)
     integer :: k
 
+    call self%origins%bring(field)
     do k = 1, self%n
       associate (i => self%row(k), from => self%origin(k), a => self%normal(self%plane(k)))
         field(i, :) = field(from, :)
@@ -115,11 +136,12 @@ contains
 
   !> What bonds pull at images pulls at what they are images of. The force at the images stays: the
   !> planes take it twice.
-  pure subroutine hand_back(self, force)
-    class(mirror_t), intent(in) :: self
+  subroutine hand_back(self, force)
+    class(mirror_t), intent(inout) :: self
     real(wp), intent(inout), contiguous :: force(:, :)   !! density (rows,2) [N/m^3]
     integer :: k
 
+    call self%both%bring(force)
     do k = self%n, 1, -1   ! images of images come last
       associate (i => self%row(k), to => self%origin(k), a => self%normal(self%plane(k)))
         force(to, a) = force(to, a) - force(i, a)

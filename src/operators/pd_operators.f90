@@ -7,18 +7,14 @@
 !> H = F - I is handed out and the first Piola stress P taken in; f is minus the adjoint of H. A is
 !> the force tensor: the force state of a bond is omega A xi. c is the stiffness of the zero-energy
 !> control, whose affine part joins A. The relaxing control is in `pd_relaxing`; its sums are
-!>
 !>   S[x]_i = sum_j w~_ij (x_j - x_i)    w~_ij = omega V_j (1 - falloff |xi|^2)
-!>
 !> In this order, once per state of u:
-!>
 !>   take_in(u, moved)                   the sums can read u
 !>   gradient_block(lo, hi, u, h)        for every block
 !>   relax_block(block, u, h, ..., p)    for every block; the relaxing control joins P
 !>   hand_over_block(lo, hi, h, p)       for every block; takes P, keeps A
 !>   share()                             the sums can read A
 !>   force_block(lo, hi, u, f)           for every block
-!>
 !> Realisations: `pd_bond_list` for any points, `pd_balanced_list` off lattices, `pd_lattice` on
 !> them. Set-up chooses; nothing else knows which. Each provides the sums G, D, Z and S. Where its
 !> weights leave out the volume of the neighbour, fields are first multiplied by its share. Families
@@ -68,6 +64,7 @@ module pd_operators
     procedure :: control_energy
     procedure :: set_relaxing
     procedure :: relaxing_energy
+    procedure :: needed_rows
     procedure, private :: residual_sums
     procedure, private :: weigh_in
     procedure, private :: weigh_block
@@ -166,8 +163,7 @@ contains
     call self%mirror%reflect_motion(u, moved)
     call self%domain%halo%exchange(u)
     call self%weigh_in(u)
-    if (.not. allocated(self%force_tensor)) &
-      allocate (self%force_tensor(self%n, 4), source=0.0_wp)   ! rows without a point stay zero
+    call self%domain%make_room(self%n, 4, self%force_tensor)   ! rows without a point stay zero
   end subroutine take_in
 
   !> Keep u times the share of the points and, for Z, times the stiffness of the control.
@@ -176,10 +172,10 @@ contains
     real(wp), intent(in), contiguous :: u(:, :)   !! (n,2) [m]
     integer :: i, first, last
 
-    first = self%domain%blocks%first
-    last = self%domain%blocks%last
+    first = self%domain%known(1)
+    last = self%domain%known(2)
     if (self%weighs) then
-      if (.not. allocated(self%weighed)) allocate (self%weighed(self%n, 2), source=0.0_wp)
+      call self%domain%make_room(self%n, 2, self%weighed)
       !$omp parallel do simd schedule(static) default(none) shared(self, u, first, last) private(i)
       do i = first, last
         self%weighed(i, 1) = self%share_of(i) * u(i, 1)
@@ -444,5 +440,14 @@ contains
     end associate
     energy = block_sum(terms)
   end function control_energy_of_block
+
+  !> Rows that the families of rows `first` to `last` read, ascending; none for no rows.
+  pure function needed_rows(self, first, last) result(rows)
+    class(operators_t), intent(in) :: self
+    integer, intent(in)  :: first, last
+    integer, allocatable :: rows(:)
+
+    rows = self%storage%around(first, last, self%domain%blocks%ends)
+  end function needed_rows
 
 end module pd_operators

@@ -15,6 +15,7 @@ module pd_storage
   type :: storage_t
     integer :: n = 0                       !! points
     integer :: rows = 0                    !! of every field
+    integer :: reach = 0                   !! lines of the lattice that a family reaches
     integer :: stride = 0                  !! rows from a line of the lattice to the next; 0: a list
     integer :: ends(2) = 0                 !! first and last row that may hold a point
     integer, allocatable :: row(:)         !! of every point, ascending (n)
@@ -25,6 +26,7 @@ module pd_storage
     generic :: spread => spread_values, spread_tensors, spread_numbers
     procedure :: point_at
     procedure :: first_point
+    procedure :: around
   end type storage_t
 
 contains
@@ -59,6 +61,7 @@ contains
       high = box(:, 2)
     end if
     margin = whole_lines(reach)
+    storage%reach = reach
     storage%n = size(place, 1)
     storage%stride = whole_lines(high(1) - low(1) + 1 + reach)
     storage%rows = storage%stride * (high(2) - low(2) + 1 + 2 * reach) + 2 * margin
@@ -144,5 +147,20 @@ contains
       end if
     end do
   end function first_point
+
+  !> Rows of a lattice as far from some rows as a family reaches, those between among them; none for
+  !> no rows.
+  pure function around(self, first, last, ends) result(rows)
+    class(storage_t), intent(in) :: self
+    integer, intent(in)  :: first, last
+    integer, intent(in)  :: ends(2)   !! first and last row that there is
+    integer, allocatable :: rows(:)
+    integer :: far, i
+
+    allocate (rows(0))
+    if (last < first) return
+    far = self%reach * (self%stride + 1)
+    rows = [(i, i=max(ends(1), first - far), min(ends(2), last + far))]
+  end function around
 
 end module pd_storage

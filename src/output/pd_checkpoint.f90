@@ -6,10 +6,12 @@
 !> it is checked before HDF5 opens the file.
 module pd_checkpoint
   use, intrinsic :: iso_fortran_env, only: int8, int32
+  use pd_blocks, only: blocks_t
   use pd_clock, only: clock_t
   use pd_errors, only: error_list_t
   use pd_fields, only: field_visitor_t, state_field_t
   use pd_files, only: file_exists, patch_file, replace_file, sync_file
+  use pd_gather, only: gather_fields, gather_values
   use pd_hdf5, only: close_file, create_file, create_group, hdf5_file_t, open_file, &
     read_attribute, read_dataset, write_attribute, write_dataset
   use pd_kinds, only: i8, wp
@@ -43,6 +45,7 @@ module pd_checkpoint
     type(hdf5_file_t)  :: file
     type(error_list_t) :: errors
     integer, allocatable :: rows(:)     !! of the points, in their order
+    type(blocks_t) :: blocks            !! of this rank
   contains
     procedure :: one_number => write_1
     procedure :: several_numbers => write_2
@@ -93,15 +96,17 @@ contains
     call errors%add('the checkpoint of an earlier run cannot be removed', where=newest(stem))
   end subroutine remove_checkpoints
 
-  !> Write a checkpoint; the newest so far becomes the previous one.
+  !> Write a checkpoint; the newest so far becomes the previous one. Rank 0 writes what all ranks
+  !> hand in.
   !>
   !> Errors: it cannot be written; the checkpoints so far are then as they were.
-  subroutine write_checkpoint(stem, checkpoint, state, rows, errors)
+  subroutine write_checkpoint(stem, checkpoint, state, rows, errors, blocks)
     character(*),       intent(in)    :: stem   !! output folder and name of the run
     type(checkpoint_t), intent(in)    :: checkpoint
     class(state_t),     intent(inout) :: state   !! visited, not changed
     integer,            intent(in)    :: rows(:) !! of the state that belong to points, in order
     type(error_list_t), intent(inout) :: errors
+    type(blocks_t), optional, intent(in) :: blocks   !! of this rank; absent: all
     character(:), allocatable :: temporary
     type(writing_t) :: writer
     integer :: before
@@ -109,11 +114,16 @@ contains
 
     before = errors%count()
     temporary = newest(stem)//'.tmp'
+    writer%rows = rows
+    if (present(blocks)) writer%blocks = blocks
+    if (writer%blocks%ranks%mine > 0) then
+      call state%visit(writer)
+      return
+    end if
     call create_file(writer%file, temporary, head_length, errors)
     call write_numbers(writer%file, checkpoint, errors)
     call create_group(writer%file, '/state', errors)
     writer%errors = errors
-    writer%rows = rows
     call state%visit(writer)
     errors = writer%errors
     call close_file(writer%file, errors)
@@ -194,9 +204,12 @@ contains
     class(writing_t),      intent(inout) :: self
     type(state_field_t),   intent(in)    :: about
     real(wp), allocatable, intent(inout) :: values(:)
+    real(wp), allocatable :: at_points(:)
 
     if (.not. about%kept) return
-    call write_dataset(self%file, place_of(about), values(self%rows), self%errors)
+    call gather_values(self%blocks, self%rows, values, at_points)
+    if (self%blocks%ranks%mine > 0) return
+    call write_dataset(self%file, place_of(about), at_points, self%errors)
     call describe(self%file, about, self%errors)
   end subroutine write_1
 
@@ -204,9 +217,12 @@ contains
     class(writing_t),      intent(inout) :: self
     type(state_field_t),   intent(in)    :: about
     real(wp), allocatable, intent(inout) :: values(:, :)
+    real(wp), allocatable :: at_points(:, :)
 
     if (.not. about%kept) return
-    call write_dataset(self%file, place_of(about), values(self%rows, :), self%errors)
+    call gather_fields(self%blocks, self%rows, values, at_points)
+    if (self%blocks%ranks%mine > 0) return
+    call write_dataset(self%file, place_of(about), at_points, self%errors)
     call describe(self%file, about, self%errors)
   end subroutine write_2
 

@@ -4,6 +4,7 @@
 !> XDMF file loop over it; one more field is a procedure and a call here.
 !> Source: doc/theory.md, section 10.
 module pd_frame_fields
+  use pd_gather, only: own_points
   use pd_kinds, only: n_block, wp
   use pd_labels, only: field_label_t
   use pd_model, only: model_t
@@ -29,7 +30,7 @@ module pd_frame_fields
 
   abstract interface
     !> The values at the points of the body and of its layers, point by point as they go to the
-    !> file.
+    !> file: those of the points of this rank.
     subroutine field_of_points(view, values)
       import :: points_view_t, wp
       type(points_view_t), intent(in)  :: view
@@ -141,10 +142,11 @@ contains
   subroutine det_f(view, values)
     type(points_view_t), intent(in)  :: view
     real(wp),            intent(out), contiguous :: values(:, :)
-    integer :: i
+    integer :: i, ends(2)
 
+    ends = own_points(view%model%blocks, view%model%shown%row)
     associate (h => view%state%displacement_gradient, row => view%model%shown%row)
-      do i = 1, size(values, 2)
+      do i = ends(1), ends(2)
         values(1, i) = determinant(h(row(i), :))
       end do
     end associate
@@ -156,12 +158,13 @@ contains
     type(points_view_t), intent(in)  :: view
     real(wp),            intent(out), contiguous :: values(:, :)
     real(wp), allocatable :: z2(:)
-    integer :: i
+    integer :: i, ends(2)
 
+    ends = own_points(view%model%blocks, view%model%shown%row)
     associate (operators => view%model%operators, state => view%state)
       allocate (z2(operators%n))
       call operators%zero_energy_squared(state%displacement, state%displacement_gradient, z2)
-      do i = 1, size(values, 2)
+      do i = ends(1), ends(2)
         values(1, i) = sqrt(z2(view%model%shown%row(i)) &
           / operators%weight_sum(view%model%shown%row(i))) / view%model%delta
       end do
@@ -173,10 +176,11 @@ contains
     type(model_t), intent(in) :: model
     real(wp), intent(in)  :: field(:, :)                    !! (rows,components)
     real(wp), intent(out), contiguous :: values(:, :)       !! (components,points)
-    integer :: i
+    integer :: i, ends(2)
 
-    !$omp parallel do schedule(static) default(none) private(i) shared(model, values, field)
-    do i = 1, size(values, 2)
+    ends = own_points(model%blocks, model%shown%row)
+    !$omp parallel do schedule(static) default(none) private(i) shared(model, values, field, ends)
+    do i = ends(1), ends(2)
       values(:, i) = field(model%shown%row(i), :)
     end do
     !$omp end parallel do

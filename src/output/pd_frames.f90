@@ -3,6 +3,7 @@ module pd_frames
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   use pd_errors, only: error_list_t
   use pd_frame_fields, only: fill_field, frame_field_t
+  use pd_gather, only: gather_points
   use pd_hdf5, only: create_group, flush_file, hdf5_file_t, overwrite_rows, read_attribute, &
     read_rows, reserve_dataset, write_attribute
   use pd_kinds, only: wp
@@ -82,7 +83,8 @@ contains
   end subroutine write_label
 
   !> Write the data of a frame and hand them to the operating system. One field after the other:
-  !> all of them at once would take too much memory with a large body.
+  !> all of them at once would take too much memory with a large body. Rank 0 writes what all ranks
+  !> hand in.
   subroutine put_frame(file, group, fields, model, state, errors)
     type(hdf5_file_t),   intent(inout) :: file
     character(*),        intent(in)    :: group
@@ -96,10 +98,12 @@ contains
     do i = 1, size(fields)
       allocate (values(fields(i)%width(), model%shown%n))
       call fill_field(fields(i), model, state, values)
-      call overwrite_rows(file, place_of(group, fields(i)), values, errors)
+      call gather_points(model%blocks, model%shown%row, values)
+      if (model%blocks%ranks%mine == 0) &
+        call overwrite_rows(file, place_of(group, fields(i)), values, errors)
       deallocate (values)
     end do
-    call flush_file(file, errors)
+    if (model%blocks%ranks%mine == 0) call flush_file(file, errors)
   end subroutine put_frame
 
   !> Mark a frame as written. Its data must have been flushed before.

@@ -246,25 +246,25 @@ contains
     value = row%model%supports%items(row%boundary)%support%force(row%component)
   end function force
 
-  pure real(wp) function plastic_dissipation(row) result(value)
+  real(wp) function plastic_dissipation(row) result(value)
     type(row_view_t), intent(in) :: row
 
     value = row%moment%ledger%plastic_dissipation(row%model%blocks)
   end function plastic_dissipation
 
-  pure real(wp) function damping_dissipation(row) result(value)
+  real(wp) function damping_dissipation(row) result(value)
     type(row_view_t), intent(in) :: row
 
     value = row%moment%ledger%damping_dissipation(row%model%blocks)
   end function damping_dissipation
 
-  pure real(wp) function stabilisation_energy(row) result(value)
+  real(wp) function stabilisation_energy(row) result(value)
     type(row_view_t), intent(in) :: row
 
     value = row%control_energy + row%moment%ledger%control_dissipation(row%model%blocks)
   end function stabilisation_energy
 
-  pure real(wp) function external_work(row) result(value)
+  real(wp) function external_work(row) result(value)
     type(row_view_t), intent(in) :: row
 
     value = row%moment%ledger%external_work(row%model%blocks)

@@ -84,7 +84,7 @@ module pd_observe
       type(block_view_t), intent(in) :: block
     end function part_of_block
     !> A value that comes from elsewhere.
-    pure real(wp) function value_of_row(row)
+    real(wp) function value_of_row(row)
       import :: row_view_t, wp
       type(row_view_t), intent(in) :: row
     end function value_of_row

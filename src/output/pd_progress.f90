@@ -52,14 +52,16 @@ contains
   !> screen.
   !>
   !> Errors: the log cannot be written.
-  subroutine open_progress(progress, stem, append, quiet, errors)
+  subroutine open_progress(progress, stem, append, quiet, errors, plain)
     type(progress_t),   intent(out)   :: progress
     character(*),       intent(in)    :: stem   !! output folder and name of the run
     logical,            intent(in)    :: append, quiet
     type(error_list_t), intent(inout) :: errors
+    logical, optional,  intent(in)    :: plain   !! a screen that looks like a terminal is none
 
     progress%on_screen = .not. quiet
     if (.not. quiet) progress%terminal = can_rewrite()
+    if (present(plain)) progress%terminal = progress%terminal .and. .not. plain
     progress%last_line = clock()
     progress%last_rewrite = progress%last_line
     call open_output(progress%log, stem//'.log', append, errors)

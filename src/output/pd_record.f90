@@ -5,6 +5,7 @@ module pd_record
   use pd_checkpoint, only: checkpoint_exists, checkpoint_t, read_checkpoint, remove_checkpoints, &
     write_checkpoint
   use pd_clock, only: clock_t
+  use pd_division, only: bring_looked_at
   use pd_doubt_list, only: doubts_t
   use pd_errors, only: error_list_t
   use pd_files, only: prepare_folder
@@ -20,8 +21,8 @@ module pd_record
   use pd_model, only: model_t
   use pd_observe, only: column_t, moment_at, moment_t, observation_t, observe
   use pd_progress, only: close_progress, open_progress, progress_t, say, show_progress, status_t
-  use pd_result, only: add_row, create_result, finish_result, places_t, read_end, result_exists, &
-    result_t, resume_result, write_failed_frame, write_frame, write_rows, write_tries
+  use pd_result, only: add_row, attend_result, create_result, finish_result, places_t, read_end, &
+    result_exists, result_t, resume_result, write_failed_frame, write_frame, write_rows, write_tries
   use pd_run_description, only: provenance_t, run_description_t
   use pd_schedule, only: schedule_t
   use pd_state, only: state_t
@@ -50,6 +51,7 @@ module pd_record
     type(observation_t) :: seen                  !! at this moment
     integer :: frames = 0                        !! written so far, 000000 among them
     integer :: rows_owed = 0, frames_owed = 0    !! due at this step, but could not be written
+    logical :: elsewhere = .false.               !! another rank writes
   end type record_t
 
   character(*), parameter :: ledger_names(4) = [character(24) :: 'initial_kinetic_energy', &
@@ -106,6 +108,12 @@ contains
     description%values = record%values
     description%time_step = checkpoint%clock%time_step
     record%columns = description%columns
+    record%elsewhere = model%blocks%ranks%mine > 0
+    if (record%elsewhere) then
+      call attend_result(record%result, record%stem, description, places_t())
+      record%frames = checkpoint%frames_written
+      return
+    end if
     call prepare_folder(input%run%output_dir, errors)
     if (errors%count() > 0) return
     if (restart) then
@@ -127,8 +135,9 @@ contains
       if (errors%count() == 0) &
         call create_history(record%history, record%stem, record%columns, errors)
     end if
-    if (errors%count() == 0) &
-      call open_progress(record%progress, record%stem, restart, quiet, errors)
+    ! what mpirun passes on looks like a terminal
+    if (errors%count() == 0) call open_progress(record%progress, record%stem, restart, quiet, &
+      errors, plain=model%blocks%ranks%count > 1)
   end subroutine open_record
 
   !> Everything in the result file except frames and rows.
@@ -195,6 +204,7 @@ contains
     type(record_t),     intent(inout) :: record
     type(error_list_t), intent(inout) :: errors
 
+    if (record%elsewhere) return
     call close_history(record%history, errors)
     call close_progress(record%progress, errors)
     if (errors%count() == 0) call finish_result(record%result, record%moment, errors)
@@ -202,12 +212,13 @@ contains
 
   !> Observe the state after a step; what is seen stays in the record.
   subroutine observe_state(model, state, ledger, clock, record)
-    type(model_t),  intent(in)    :: model
-    type(state_t),  intent(in)    :: state
+    type(model_t),  intent(inout) :: model
+    type(state_t),  intent(inout) :: state
     type(ledger_t), intent(in)    :: ledger
     type(clock_t),  intent(in)    :: clock
     type(record_t), intent(inout) :: record
 
+    call bring_looked_at(model, state)
     record%moment = moment_at(clock, model, state, ledger)
     call observe(record%columns, model, state, record%moment, record%seen)
   end subroutine observe_state
@@ -218,6 +229,7 @@ contains
     type(error_list_t), intent(inout) :: errors
     integer :: before
 
+    if (record%elsewhere) return
     before = record%history%rows
     call write_row(record%history, record%seen%values, errors)
     if (record%history%rows == before) record%rows_owed = record%rows_owed + 1
@@ -247,25 +259,27 @@ contains
     type(record_t),     intent(inout) :: record
     type(error_list_t), intent(inout) :: errors
 
+    if (record%elsewhere) return
     call write_tries(record%result, tries, errors)
   end subroutine record_tries
 
   !> Write the state of a run that has failed, marked as not valid.
   subroutine record_failure(model, state, clock, record, errors)
-    type(model_t),      intent(in)    :: model
-    type(state_t),      intent(in)    :: state
+    type(model_t),      intent(inout) :: model
+    type(state_t),      intent(inout) :: state
     type(clock_t),      intent(in)    :: clock
     type(record_t),     intent(inout) :: record
     type(error_list_t), intent(inout) :: errors
 
+    call bring_looked_at(model, state)
     call write_failed_frame(record%result, moment_at(clock, model, state, ledger_t()), model, &
       state, errors)
   end subroutine record_failure
 
   !> Show the progress of the run; axial stress and largest alpha are those of the last row.
   subroutine record_progress(model, state, schedule, clock, record, errors)
-    type(model_t),      intent(in)    :: model
-    type(state_t),      intent(in)    :: state
+    type(model_t),      intent(inout) :: model
+    type(state_t),      intent(inout) :: state
     type(schedule_t),   intent(in)    :: schedule
     type(clock_t),      intent(in)    :: clock
     type(record_t),     intent(inout) :: record
@@ -273,6 +287,8 @@ contains
     type(status_t) :: status
     type(moment_t) :: moment
 
+    call bring_looked_at(model, state)
+    if (record%elsewhere) return
     status%step = clock%step
     status%steps = schedule%steps
     status%time = clock%time()
@@ -294,6 +310,7 @@ contains
     character(*),       intent(in)    :: text
     type(error_list_t), intent(inout) :: errors
 
+    if (record%elsewhere) return
     call say(record%progress, text, errors)
   end subroutine record_line
 
@@ -303,7 +320,7 @@ contains
     type(doubts_t),     intent(in)    :: doubts
     type(error_list_t), intent(inout) :: errors
 
-    call write_doubts(record%result%path, doubts, errors)
+    if (.not. record%elsewhere) call write_doubts(record%result%path, doubts, errors)
   end subroutine record_doubts
 
   !> Write the quality at the end of the run into the result file.
@@ -312,7 +329,7 @@ contains
     type(quality_t),    intent(in)    :: quality
     type(error_list_t), intent(inout) :: errors
 
-    call write_quality(record%result%path, quality, errors)
+    if (.not. record%elsewhere) call write_quality(record%result%path, quality, errors)
   end subroutine record_quality
 
   !> The doubts that were told during the run before a checkpoint.
@@ -331,16 +348,18 @@ contains
     integer,        intent(in)  :: rows
     real(wp),       intent(out) :: largest
     character(1), parameter :: axes(2) = ['x', 'y']
+    real(wp) :: found(1)
 
-    largest = 0.0_wp
+    found = 0.0_wp
     associate (p => model%platens, items => model%supports%items)
-      if (p%axis == 0) return
-      largest = max( &
+      if (p%axis > 0 .and. .not. record%elsewhere) found = max( &
         largest_of_column(record%result%path, rows, items(p%first)%support%name//'_force_'// &
         axes(p%axis)), &
         largest_of_column(record%result%path, rows, items(p%second)%support%name//'_force_'// &
         axes(p%axis)))
     end associate
+    call model%blocks%ranks%fill_in(found)
+    largest = found(1)
   end subroutine largest_reaction_before
 
   !> Write a checkpoint of the state after a step, but first the rows of the history before it.
@@ -355,9 +374,9 @@ contains
     integer :: before
 
     before = errors%count()
-    call write_rows(record%result, errors)
-    if (errors%count() == before) call put_checkpoint(model, state, ledger, clock, limit, record, &
-      errors)
+    if (.not. record%elsewhere) call write_rows(record%result, errors)
+    if (.not. any_rank(model, errors%count() > before)) call put_checkpoint(model, state, ledger, &
+      clock, limit, record, errors)
   end subroutine save_checkpoint
 
   !> Write a last checkpoint where a file cannot be written: a restart writes what is owed. It takes
@@ -373,13 +392,24 @@ contains
     type(error_list_t), intent(inout) :: errors
     type(error_list_t) :: known
 
-    if (.not. record%result%is_lost) call write_rows(record%result, known)
-    if (record%result%is_foreign) then
+    if (.not. (record%result%is_lost .or. record%elsewhere)) call write_rows(record%result, known)
+    if (any_rank(model, record%result%is_foreign)) then
       call errors%add('no checkpoint is written: another run writes these files')
     else
       call put_checkpoint(model, state, ledger, clock, limit, record, errors)
     end if
   end subroutine save_last_checkpoint
+
+  !> Whether something is so on any rank: only the one that writes knows of files.
+  logical function any_rank(model, here)
+    type(model_t), intent(in) :: model
+    logical,       intent(in) :: here
+    integer :: found(1)
+
+    found = merge(1, 0, here)
+    call model%blocks%ranks%largest_numbers(found)
+    any_rank = found(1) > 0
+  end function any_rank
 
   subroutine put_checkpoint(model, state, ledger, clock, limit, record, errors)
     type(model_t),      intent(in)    :: model
@@ -390,7 +420,9 @@ contains
     type(record_t),     intent(inout) :: record
     type(error_list_t), intent(inout) :: errors
     type(checkpoint_t) :: checkpoint
+    type(ledger_t) :: whole
 
+    whole = ledger%gathered(model%blocks)
     checkpoint%clock = clock
     checkpoint%limit = limit
     checkpoint%history_rows = record%history%rows
@@ -400,14 +432,14 @@ contains
     checkpoint%ledger_names = ledger_names
     checkpoint%ledger = [ledger%initial_kinetic_energy, ledger%initial_strain_energy, &
       ledger%largest_work, ledger%outer_work]
-    allocate (checkpoint%ledger_blocks(size(ledger%plastic), 4))
-    checkpoint%ledger_blocks(:, 1) = ledger%plastic
-    checkpoint%ledger_blocks(:, 2) = ledger%damping
-    checkpoint%ledger_blocks(:, 3) = ledger%frame_work
-    checkpoint%ledger_blocks(:, 4) = ledger%control
+    allocate (checkpoint%ledger_blocks(size(whole%plastic), 4))
+    checkpoint%ledger_blocks(:, 1) = whole%plastic
+    checkpoint%ledger_blocks(:, 2) = whole%damping
+    checkpoint%ledger_blocks(:, 3) = whole%frame_work
+    checkpoint%ledger_blocks(:, 4) = whole%control
     checkpoint%input = record%values
     call points_of(model, checkpoint%position, checkpoint%volume, checkpoint%boundary)
-    call write_checkpoint(record%stem, checkpoint, state, model%shown%row, errors)
+    call write_checkpoint(record%stem, checkpoint, state, model%shown%row, errors, model%blocks)
   end subroutine put_checkpoint
 
   !> Read the newest checkpoint and compare its input with the present one. The state has one row

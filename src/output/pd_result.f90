@@ -31,7 +31,8 @@ module pd_result
   private
 
   public :: places_t, result_t, bunch
-  public :: create_result, resume_result, add_row, write_rows, write_frame, write_failed_frame
+  public :: create_result, resume_result, attend_result, add_row, write_rows, write_frame
+  public :: write_failed_frame
   public :: write_tries, finish_result, result_exists, read_end
 
   !> Numbers of frames and rows for which a result file has space.
@@ -56,6 +57,7 @@ module pd_result
     character(:), allocatable :: writer   !! which run wrote the file: this one
     logical :: is_foreign = .false.    !! another one has been found in its place
     logical :: is_lost = .false.       !! it could not be opened
+    logical, private :: elsewhere = .false.   !! another rank writes it
     integer :: rows_written = 0
     integer,  private :: waiting = 0                   !! rows not written yet
     real(wp), private :: waiting_since = 0.0_wp        !! clock at the first of these rows [s]
@@ -106,6 +108,17 @@ contains
     call create_structure(result, file, description, errors)
     call publish(result, file, errors)
   end subroutine create_result
+
+  !> Take part in a result file that another rank writes: hand in the fields of the frames.
+  subroutine attend_result(result, stem, description, places)
+    type(result_t),          intent(out) :: result
+    character(*),            intent(in)  :: stem
+    type(run_description_t), intent(in)  :: description
+    type(places_t),          intent(in)  :: places
+
+    call describe_result(result, stem, description, places)
+    result%elsewhere = .true.
+  end subroutine attend_result
 
   !> Go on with the result file of a run that was cut off: a new file with the first frames and rows
   !> of the old one and space for more replaces it.
@@ -261,11 +274,16 @@ contains
     integer :: before
 
     before = errors%count()
-    if (index < 0 .or. index >= result%places%frames) then
-      call errors%add('there is no place for frame '//frame_name(index), where=result%path)
+    if (result%elsewhere) then
+      call put_frame(file, frame_name(index), result%fields, model, state, errors)
       return
     end if
-    call open_own(result, file, errors)
+    if (index < 0 .or. index >= result%places%frames) then
+      call errors%add('there is no place for frame '//frame_name(index), where=result%path)
+      file%failed = .true.   ! other ranks hand in what they have
+    else
+      call open_own(result, file, errors)
+    end if
     call put_waiting_rows(result, file, errors)
     call put_frame(file, frame_name(index), result%fields, model, state, errors)
     call mark_frame(file, frame_name(index), with_strain(result, moment), .true., errors)
@@ -286,6 +304,10 @@ contains
     type(error_list_t), intent(inout) :: errors
     type(hdf5_file_t) :: file
 
+    if (result%elsewhere) then
+      call put_frame(file, '/failed_frame', result%fields, model, state, errors)
+      return
+    end if
     call open_own(result, file, errors)
     call put_waiting_rows(result, file, errors)
     call put_frame(file, '/failed_frame', result%fields, model, state, errors)

@@ -1,0 +1,224 @@
+!> The ranks that share a run: those that mpirun has started.
+!>
+!> Form with messages, in the place of src/base/pd_ranks.f90. This is the only module that calls
+!> MPI. Sums gather one number per block and add them in the order of the blocks, as the serial form
+!> does: no sum is left to MPI, whose order of additions depends on the number of ranks. An error of
+!> MPI ends all ranks (MPI_ERRORS_ARE_FATAL).
+module pd_ranks
+  use, intrinsic :: iso_fortran_env, only: error_unit, output_unit
+  use mpi_f08, only: mpi_abort, mpi_allgatherv, mpi_allreduce, mpi_bcast, mpi_bor, &
+    mpi_comm_rank, mpi_comm_size, mpi_comm_world, mpi_double_precision, mpi_finalize, &
+    mpi_gatherv, mpi_in_place, mpi_init_thread, mpi_integer, mpi_integer8, mpi_irecv, mpi_isend, &
+    mpi_max, mpi_min, mpi_recv, mpi_request, mpi_send, mpi_status_ignore, mpi_statuses_ignore, &
+    mpi_thread_funneled, mpi_waitall
+  use pd_kinds, only: wp
+  implicit none
+  private
+
+  public :: ranks_t, begin_ranks, end_ranks, abort_ranks
+
+  !> The ranks of a run, numbered from 0. The blocks of a body are divided among them where `before`
+  !> is allocated; until then every rank has all of them.
+  type :: ranks_t
+    integer :: count = 1
+    integer :: mine = 0
+    integer, allocatable :: before(:)   !! blocks before those of each rank, and all (0:count)
+  contains
+    procedure :: total
+    procedure :: running_total
+    procedure :: largest
+    procedure :: smallest
+    procedure :: lowest_number
+    procedure :: gathered
+    procedure :: largest_numbers
+    procedure :: fill_in
+    procedure :: swap
+    procedure :: collect
+    procedure :: spread_out
+  end type ranks_t
+
+  integer, parameter :: any_tag = 0
+
+contains
+
+  !> Begin: who takes part.
+  subroutine begin_ranks(ranks)
+    type(ranks_t), intent(out) :: ranks
+    integer :: provided
+
+    call mpi_init_thread(mpi_thread_funneled, provided)
+    call mpi_comm_size(mpi_comm_world, ranks%count)
+    call mpi_comm_rank(mpi_comm_world, ranks%mine)
+  end subroutine begin_ranks
+
+  !> End, all ranks together.
+  subroutine end_ranks()
+    call mpi_finalize()
+  end subroutine end_ranks
+
+  !> End all ranks from one of them, with an exit status.
+  subroutine abort_ranks(status)
+    integer, intent(in) :: status
+
+    flush (output_unit)
+    flush (error_unit)
+    call mpi_abort(mpi_comm_world, status)
+  end subroutine abort_ranks
+
+  !> Sum over the blocks of all ranks, in the order of the blocks of the whole body: the
+  !> same bits for any number of ranks.
+  real(wp) function total(self, parts)
+    class(ranks_t), intent(in) :: self
+    real(wp),       intent(in) :: parts(:)   !! one number per block of this rank
+
+    total = sum(self%gathered(parts))
+  end function total
+
+  !> Sum over the rows of all ranks, row by row in the order of the whole body: each rank goes on
+  !> with the sum of the one before it.
+  real(wp) function running_total(self, terms) result(so_far)
+    class(ranks_t), intent(in) :: self
+    real(wp),       intent(in) :: terms(:)   !! one number per row of this rank
+    integer :: i
+
+    so_far = 0.0_wp
+    if (self%mine > 0) call mpi_recv(so_far, 1, mpi_double_precision, self%mine - 1, any_tag, &
+      mpi_comm_world, mpi_status_ignore)
+    do i = 1, size(terms)
+      so_far = so_far + terms(i)
+    end do
+    if (self%mine < self%count - 1) call mpi_send(so_far, 1, mpi_double_precision, &
+      self%mine + 1, any_tag, mpi_comm_world)
+    if (self%count > 1) &
+      call mpi_bcast(so_far, 1, mpi_double_precision, self%count - 1, mpi_comm_world)
+  end function running_total
+
+  !> Largest number of the blocks of all ranks; -huge if there are no blocks.
+  real(wp) function largest(self, parts)
+    class(ranks_t), intent(in) :: self
+    real(wp),       intent(in) :: parts(:)   !! one number per block of this rank
+
+    largest = maxval(self%gathered(parts))
+  end function largest
+
+  !> Smallest number of the blocks of all ranks; huge if there are no blocks.
+  real(wp) function smallest(self, parts)
+    class(ranks_t), intent(in) :: self
+    real(wp),       intent(in) :: parts(:)   !! one number per block of this rank
+
+    smallest = minval(self%gathered(parts))
+  end function smallest
+
+  !> Lowest positive number of the blocks of all ranks; 0: there is none.
+  integer function lowest_number(self, parts) result(lowest)
+    class(ranks_t), intent(in) :: self
+    integer,        intent(in) :: parts(:)   !! one number per block of this rank
+
+    lowest = minval(parts, mask=parts > 0)   ! huge where there is none
+    if (allocated(self%before)) &
+      call mpi_allreduce(mpi_in_place, lowest, 1, mpi_integer, mpi_min, mpi_comm_world)
+    if (lowest == huge(lowest)) lowest = 0
+  end function lowest_number
+
+  !> The numbers of the blocks of all ranks, in the order of the blocks.
+  function gathered(self, parts) result(all_parts)
+    class(ranks_t), intent(in) :: self
+    real(wp),       intent(in) :: parts(:)   !! one number per block of this rank
+    real(wp), allocatable :: all_parts(:), own(:)
+
+    if (.not. allocated(self%before)) then
+      all_parts = parts
+      return
+    end if
+    associate (ends => self%before)
+      own = parts
+      allocate (all_parts(ends(self%count)))
+      call mpi_allgatherv(own, size(own), mpi_double_precision, all_parts, &
+        ends(1:) - ends(:self%count - 1), ends(:self%count - 1), mpi_double_precision, &
+        mpi_comm_world)
+    end associate
+  end function gathered
+
+  !> The largest of every number on any rank.
+  subroutine largest_numbers(self, numbers)
+    class(ranks_t), intent(in)    :: self
+    integer,        intent(inout) :: numbers(:)
+
+    if (self%count > 1) call mpi_allreduce(mpi_in_place, numbers, size(numbers), mpi_integer, &
+      mpi_max, mpi_comm_world)
+  end subroutine largest_numbers
+
+  !> Numbers of which each is known to one rank, made known to all, bit by bit.
+  subroutine fill_in(self, numbers)
+    class(ranks_t), intent(in) :: self
+    real(wp), intent(inout), contiguous :: numbers(:)   !! in: 0 but for those that are known here
+
+    if (allocated(self%before)) call mpi_allreduce(mpi_in_place, numbers, size(numbers), &
+      mpi_integer8, mpi_bor, mpi_comm_world)
+  end subroutine fill_in
+
+  !> Send numbers to some ranks and receive others from them.
+  subroutine swap(self, partners, sent_ends, sent, received_ends, received)
+    class(ranks_t), intent(in) :: self
+    integer,  intent(in) :: partners(:)                  !! ranks
+    integer,  intent(in) :: sent_ends(0:)                !! last number for each; 0 before the first
+    integer,  intent(in) :: received_ends(0:)            !! likewise
+    real(wp), intent(in),    contiguous, asynchronous :: sent(:)
+    real(wp), intent(inout), contiguous, asynchronous :: received(:)
+    type(mpi_request) :: requests(2 * size(partners))
+    integer :: k, n
+
+    n = 0
+    if (self%count == 1) return
+    do k = 1, size(partners)
+      if (received_ends(k) > received_ends(k - 1)) then
+        n = n + 1
+        call mpi_irecv(received(received_ends(k - 1) + 1:received_ends(k)), &
+          received_ends(k) - received_ends(k - 1), mpi_double_precision, partners(k), any_tag, &
+          mpi_comm_world, requests(n))
+      end if
+    end do
+    do k = 1, size(partners)
+      if (sent_ends(k) > sent_ends(k - 1)) then
+        n = n + 1
+        call mpi_isend(sent(sent_ends(k - 1) + 1:sent_ends(k)), sent_ends(k) - sent_ends(k - 1), &
+          mpi_double_precision, partners(k), any_tag, mpi_comm_world, requests(n))
+      end if
+    end do
+    call mpi_waitall(n, requests(:n), mpi_statuses_ignore)
+  end subroutine swap
+
+  !> Columns of an array of which each is known to one rank, made known to rank 0.
+  subroutine collect(self, values, ends)
+    class(ranks_t), intent(in) :: self
+    real(wp), intent(inout), contiguous :: values(:, :)
+    integer,  intent(in) :: ends(0:)   !! last column of each rank; ends(0): those before the first
+    integer :: width, mine
+
+    if (self%count == 1) return
+    width = size(values, 1)
+    mine = self%mine
+    associate (counts => width * (ends(1:) - ends(:self%count - 1)))
+      if (mine == 0) then
+        call mpi_gatherv(mpi_in_place, 0, mpi_double_precision, values, counts, &
+          width * ends(:self%count - 1), mpi_double_precision, 0, mpi_comm_world)
+      else
+        call mpi_gatherv(values(:, ends(mine) + 1:ends(mine + 1)), counts(mine + 1), &
+          mpi_double_precision, values, counts, width * ends(:self%count - 1), &
+          mpi_double_precision, 0, mpi_comm_world)
+      end if
+    end associate
+  end subroutine collect
+
+  !> The same, made known to all ranks.
+  subroutine spread_out(self, values, ends)
+    class(ranks_t), intent(in) :: self
+    real(wp), intent(inout), contiguous :: values(:, :)
+    integer,  intent(in) :: ends(0:)
+
+    if (self%count > 1) call mpi_allgatherv(mpi_in_place, 0, mpi_double_precision, values, &
+      size(values, 1) * (ends(1:) - ends(:self%count - 1)), &
+      size(values, 1) * ends(:self%count - 1), mpi_double_precision, mpi_comm_world)
+  end subroutine spread_out
+
+end module pd_ranks

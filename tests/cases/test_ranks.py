@@ -1,0 +1,297 @@
+"""Several ranks: the bits of a serial run, restart with other numbers of ranks, ends of all kinds.
+
+They run where `make MPI=1` has built bin/perigeo-mpi and mpirun is there. Ranks share cores here,
+as they never should in a run that matters, so nothing is said of times.
+"""
+
+import os
+import re
+import shutil
+import signal
+import subprocess
+import time
+from pathlib import Path
+
+import frozen_cases
+import h5py
+import pytest
+from case_files import SPECIMEN, changed, groups_of, uncontrolled
+from test_equilibrium import RESTING
+from test_ground import CLAY, COLUMN, EQUILIBRIUM, FOOTING, MOVING
+from test_stages import BAR, BLOCKS
+
+TIME_LIMIT = 60.0
+ENVIRONMENT = {
+    "OMP_NUM_THREADS": "1",
+    "OMP_WAIT_POLICY": "passive",
+    "OMPI_ALLOW_RUN_AS_ROOT": "1",
+    "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
+    "OMPI_MCA_rmaps_base_oversubscribe": "1",
+    "OMPI_MCA_hwloc_base_binding_policy": "none",
+    "OMPI_MCA_mpi_yield_when_idle": "1",
+}
+
+
+@pytest.fixture(scope="session")
+def ranked(program):
+    """Return the program for several ranks, of the same build; skip where it cannot run."""
+    path = program.with_name(program.name.replace("perigeo", "perigeo-mpi"))
+    if not path.is_file():
+        pytest.skip(f"{path.name} is not there; make MPI=1 builds it")
+    if path.stat().st_mtime < program.stat().st_mtime:
+        pytest.skip(f"{path.name} is older than {program.name}; make MPI=1 builds it")
+    if not shutil.which("mpirun"):
+        pytest.skip("mpirun is not there")
+    return path
+
+
+def command(path, ranks, *options):
+    """Return the words that start a run with some ranks; 0: the serial program."""
+    words = ["mpirun", "-n", str(ranks)] if ranks else []
+    return [*words, str(path), "--quiet", *map(str, options), "run.nml"]
+
+
+@pytest.fixture
+def start(program, ranked, tmp_path):
+    """Return a function that starts a run of a case in a folder; none outlives the test."""
+    started = []
+
+    def begin(text, folder, ranks, *options):
+        place = tmp_path / folder
+        place.mkdir(exist_ok=True)
+        (place / "run.nml").write_text(uncontrolled(text))
+        (place / "cloud.txt").write_text(cloud())
+        process = subprocess.Popen(
+            command(ranked if ranks else program, ranks, *options),
+            cwd=place,
+            env={**os.environ, **ENVIRONMENT},
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        started.append(process)
+        return process
+
+    yield begin
+    for process in started:
+        if process.poll() is None:
+            process.terminate()  # mpirun ends its ranks
+            process.wait(timeout=TIME_LIMIT)
+
+
+@pytest.fixture
+def run(start, tmp_path):
+    """Return a function that runs a case; it returns exit status, errors, and the results."""
+
+    def to_the_end(text, folder, ranks, *options):
+        process = start(text, folder, ranks, *options)
+        _, said = process.communicate(timeout=TIME_LIMIT)
+        return process.returncode, said, tmp_path / folder / "out"
+
+    return to_the_end
+
+
+def cloud():
+    """Return the text of a point cloud off a lattice, in an order that scatters it over ranks."""
+    lines = []
+    for j in range(-3, 44):
+        for i in range(20):
+            k = 17 * i + 29 * j
+            x = 0.025 * i + 0.00025 * (k * k % 23 - 11)
+            y = 0.025 * j + 0.00025 * (k * k % 19 - 9)
+            name = "bottom" if j < 0 else "top" if j > 40 else ""
+            lines.append(f"{x:.5f} {y:.5f} {6.25e-4 + 1e-6 * (k % 37):.8f} {name}\n")
+    return "".join(lines[7 * k % len(lines)] for k in range(len(lines)))
+
+
+def same_file(one, other, groups):
+    """Assert that two HDF5 files hold the same bits in some groups."""
+    with (
+        h5py.File(one, locking=False) as first,
+        h5py.File(other, locking=False) as second,
+    ):
+        left, right = groups_of(first, groups), groups_of(second, groups)
+        assert left.keys() == right.keys()
+        for path, value in left.items():
+            assert value.tobytes() == right[path].tobytes(), path
+
+
+def same_results(one, other):
+    """Assert that history, frames and the last checkpoint are the same, bit by bit."""
+    for name in ("case_history.csv", "case.xdmf"):
+        assert (one / name).read_bytes() == (other / name).read_bytes(), name
+    same_file(one / "case.h5", other / "case.h5", ("points", "frames", "history"))
+    same_file(one / "case_checkpoint.h5", other / "case_checkpoint.h5", ("/",))
+
+
+def finer(text):
+    """Return a case on a finer lattice, so that there are blocks for several ranks."""
+    text = re.sub(r"horizon = [\d.]+", "horizon = 0.08", text)
+    text = re.sub(r"spacing = [\d.]+", "spacing = 0.025", text)
+    text = re.sub(r"end_time = ([\d.]+)", lambda m: f"end_time = {0.25 * float(m[1])}", text)
+    return text.replace("final_strain = 0.008", "final_strain = 0.004")
+
+
+def keeping(text):
+    """Return a case that leaves a checkpoint of its end."""
+    return text.replace("&output", "&output checkpoint_every = 1.0e9,")
+
+
+FROZEN = frozen_cases.CASES
+PROBES = "&probe name = 'a', x = 3.0, y = -1.0 /\n&probe name = 'b', x = 5.8, y = -0.3 /\n"
+FINE_CLAY = CLAY.replace("spacing = 0.25, horizon = 0.5", "spacing = 0.125, horizon = 0.375")
+FINE_COLUMN = COLUMN.replace("spacing = 0.25, horizon = 0.5", "spacing = 0.125, horizon = 0.375")
+CASES = {
+    "lattice": finer(FROZEN["lattice"]),
+    "list and control": finer(FROZEN["list_control"]),
+    "tributary": finer(FROZEN["tributary"]),
+    "control and materials": finer(FROZEN["materials"]),
+    "loads": finer(FROZEN["loaded"]),
+    "cut and relaxing control": finer(FROZEN["sight"]),
+    "cloud": finer(FROZEN["cloud"]),
+    "polygons": FROZEN["polygon"],
+    "gravity": FINE_COLUMN.replace(EQUILIBRIUM, MOVING) + PROBES,
+    "equilibrium": FINE_CLAY + PROBES + FOOTING,
+    "softening at equilibrium": changed(
+        RESTING, spacing="0.05", horizon="0.16", final_strain="0.005"
+    ).replace("increments = 100", "increments = 20").replace("= 0.004, 0.01", "= 0.004"),
+    "stages": BLOCKS,
+    "factor of safety": BAR.replace("tolerance = 0.01", "tolerance = 0.5"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_results_have_the_bits_of_a_serial_run(run, name):
+    text = keeping(CASES[name])
+    status, said, serial = run(text, "serial", 0)
+    assert status == 0, said
+    for ranks, threads in ((2, 2), (3, 1)):
+        status, said, results = run(text, f"ranks{ranks}", ranks, "--threads", threads)
+        assert status == 0, said
+        same_results(serial, results)
+
+
+def test_no_number_of_ranks_and_threads_changes_a_bit(run):
+    # five blocks, so that four ranks have different numbers of them
+    text = keeping(finer(FROZEN["lattice_control"]))
+    status, said, serial = run(text, "serial", 0)
+    assert status == 0, said
+    for ranks in (1, 2, 3, 4):
+        for threads in (1, 2):
+            status, said, results = run(text, f"{ranks}x{threads}", ranks, "--threads", threads)
+            assert status == 0, said
+            same_results(serial, results)
+
+
+def test_ranks_without_blocks_wait_for_the_others(run):
+    text = keeping(FROZEN["lattice"])  # a single block
+    status, said, serial = run(text, "serial", 0)
+    assert status == 0, said
+    status, said, results = run(text, "ranks", 4)
+    assert status == 0, said
+    same_results(serial, results)
+
+
+# ------------------------------------------------------------------------------- restart
+
+LONG = changed(SPECIMEN, final_strain="0.04", history_count="400", spacing="0.05", horizon="0.16")
+LONG = keeping(LONG.replace("frame_strains = 0.004, 0.01", "frame_count = 20"))
+
+
+def rows_written(folder):
+    """Return how many lines the history has."""
+    path = folder / "case_history.csv"
+    return path.read_bytes().count(b"\n") if path.exists() else 0
+
+
+def wait_for_rows(process, folder, rows):
+    """Wait until the history has so many lines."""
+    end = time.monotonic() + TIME_LIMIT
+    while process.poll() is None and rows_written(folder) < rows:
+        assert time.monotonic() < end
+        time.sleep(0.002)
+
+
+def test_a_run_goes_on_with_any_number_of_ranks(start, run, tmp_path):
+    status, said, serial = run(LONG, "serial", 0)
+    assert status == 0, said
+    out = tmp_path / "ranks" / "out"
+    for ranks, rows, options in ((4, 80, ()), (1, 200, ("--restart",))):
+        process = start(LONG, "ranks", ranks, *options)
+        wait_for_rows(process, out, rows)
+        process.send_signal(signal.SIGUSR1)  # mpirun passes it on
+        assert process.wait(TIME_LIMIT) == 143
+        assert rows <= rows_written(out) < 401
+    status, said, _ = run(LONG, "ranks", 3, "--restart")
+    assert status == 0, said
+    same_results(serial, out)
+
+
+def test_a_rank_that_dies_ends_all_and_the_last_checkpoint_is_good(start, run, tmp_path):
+    text = LONG.replace("checkpoint_every = 1.0e9", "checkpoint_every = 0.05")
+    out = tmp_path / "ranks" / "out"
+    process = start(text, "ranks", 3)
+    wait_for_rows(process, out, 40)
+    while not (out / "case_checkpoint.h5").exists():
+        time.sleep(0.002)
+    os.kill(ranks_of(process.pid)[1], signal.SIGKILL)
+    assert process.wait(TIME_LIMIT) not in (0, None)
+    assert rows_written(out) < 401
+    status, said, _ = run(LONG, "ranks", 2, "--restart")
+    assert status == 0, said
+    status, said, serial = run(LONG, "serial", 0)
+    assert status == 0, said
+    same_results(serial, out)
+
+
+def ranks_of(parent):
+    """Return the processes that mpirun has started itself, in the order of their ranks."""
+    children = Path(f"/proc/{parent}/task").glob("*/children")
+    found = sorted({int(word) for path in children for word in path.read_text().split()})
+    return [n for n in found if "perigeo" in Path(f"/proc/{n}/comm").read_text()]
+
+
+# ------------------------------------------------------------------------------- check
+
+
+def test_the_check_tells_what_ranks_would_have(start):
+    process = start(finer(FROZEN["lattice"]), "check", 3, "--check")
+    told, said = process.communicate(timeout=TIME_LIMIT)
+    assert process.returncode == 0, said
+    assert told.count("the input is right") == 1
+    points = int(re.search(r"points +(\d+),", told)[1])
+    fewest, most = map(int, re.search(r"ranks +3: (\d+) to (\d+) points", told).groups())
+    assert 3 * fewest <= points <= 3 * most
+    assert fewest >= 0.5 * most
+    halo = int(re.search(r"halo +(\d+) rows", told)[1])
+    assert 0 < halo < points
+
+
+# ------------------------------------------------------------------------------- errors
+
+
+def test_an_error_of_the_input_is_told_once(run):
+    status, said, _ = run(changed(SPECIMEN, spacing="-0.1"), "wrong", 3)
+    assert status == 2
+    assert said.count("perigeo: error:") == 1
+    assert "spacing" in said
+
+
+def test_a_calculation_that_fails_ends_all_ranks_at_the_same_state(run):
+    text = finer(FROZEN["affine"]).replace("3.7e-4", "3.7e-3")
+    status, told, serial = run(text, "serial", 0)
+    assert status == 4
+    status, said, results = run(text, "ranks", 3)
+    assert status == 4
+    assert said.startswith(told.strip())
+    assert said.count("perigeo: error:") == 1
+    same_file(serial / "case.h5", results / "case.h5", ("frames", "failed_frame", "history"))
+
+
+def test_a_file_that_cannot_be_written_ends_all_ranks(run, tmp_path):
+    (tmp_path / "ranks").mkdir()
+    (tmp_path / "ranks" / "out").write_text("in the way")
+    status, said, _ = run(LONG, "ranks", 3)
+    assert status == 5
+    assert said.count("perigeo: error:") == 1
