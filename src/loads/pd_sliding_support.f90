@@ -60,12 +60,14 @@ contains
   end subroutine share_forces
 
   !> Points of the body belong to the columns, too.
-  pure subroutine mark_read(self, marked)
+  pure subroutine mark_read(self, held, pushed)
     class(sliding_support_t), intent(in)    :: self
-    logical,                  intent(inout) :: marked(:)
+    logical,                  intent(inout) :: held(:), pushed(:)
 
-    marked(self%points) = .true.
-    marked(pack(self%columns, self%columns > 0)) = .true.
+    associate (unchanged => pushed)
+    end associate
+    held(self%points) = .true.
+    held(pack(self%columns, self%columns > 0)) = .true.
   end subroutine mark_read
 
 end module pd_sliding_support
