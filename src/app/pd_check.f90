@@ -97,8 +97,7 @@ contains
       ' rows of other ranks at most, '//short_number(maxval(real(of_rank%halo, wp) &
       / real(max(1, of_rank%rows), wp)))//' of the own ones; displacement and force tensor, '// &
       short_number(48.0e-3_wp * real(maxval(of_rank%halo), wp))//' kB per step'
-    write (output_unit, '(a)') '  memory              about half of that above in every rank, for each '// &
-      'sets up the whole body'
+    write (output_unit, '(a)') '  set-up              that of the whole body, by every rank'
     if (words_on_cores(run%ranks) /= '') &
       write (output_unit, '(a)') '  cores               '//words_on_cores(run%ranks)
   end subroutine print_shares

@@ -17,7 +17,6 @@ module pd_shared_rows
     real(wp), allocatable, private :: numbers(:)      !! work space
   contains
     procedure :: bring
-    procedure :: bring_both
   end type shared_rows_t
 
 contains
@@ -39,27 +38,12 @@ contains
     real(wp), intent(inout), contiguous :: field(:, :)   !! (n, components)
 
     if (.not. allocated(self%rows)) return
+    if (size(self%rows) == 0) return
     call make_room(self, size(field, 2))
-    call put(self, field, 0)
+    call put(self, field)
     call self%ranks%fill_in(self%numbers(:size(self%rows) * size(field, 2)))
-    call take(self, field, 0)
+    call take(self, field)
   end subroutine bring
-
-  !> Make the rows of two fields known, together.
-  subroutine bring_both(self, one, two)
-    class(shared_rows_t), intent(inout) :: self
-    real(wp), intent(inout), contiguous :: one(:, :), two(:, :)   !! (n, components)
-    integer :: columns
-
-    if (.not. allocated(self%rows)) return
-    columns = size(one, 2) + size(two, 2)
-    call make_room(self, columns)
-    call put(self, one, 0)
-    call put(self, two, size(one, 2))
-    call self%ranks%fill_in(self%numbers(:size(self%rows) * columns))
-    call take(self, one, 0)
-    call take(self, two, size(one, 2))
-  end subroutine bring_both
 
   !> Make room for a number of columns; it stays for the next time.
   subroutine make_room(self, columns)
@@ -73,14 +57,13 @@ contains
     allocate (self%numbers(columns * size(self%rows)), source=0.0_wp)
   end subroutine make_room
 
-  !> Put what is known here behind some columns, and 0 where another rank knows it.
-  subroutine put(self, field, before)
+  !> Put what is known here, and 0 where another rank knows it.
+  subroutine put(self, field)
     class(shared_rows_t), intent(inout) :: self
-    real(wp), intent(in)  :: field(:, :)
-    integer,  intent(in)  :: before
+    real(wp), intent(in) :: field(:, :)
     integer :: c, k, n
 
-    n = before * size(self%rows)
+    n = 0
     do c = 1, size(field, 2)
       do k = 1, size(self%rows)
         n = n + 1
@@ -90,13 +73,12 @@ contains
     end do
   end subroutine put
 
-  subroutine take(self, field, before)
+  subroutine take(self, field)
     class(shared_rows_t), intent(in) :: self
     real(wp), intent(inout) :: field(:, :)
-    integer,  intent(in)    :: before
     integer :: c, k, n
 
-    n = before * size(self%rows)
+    n = 0
     do c = 1, size(field, 2)
       do k = 1, size(self%rows)
         n = n + 1

@@ -28,6 +28,7 @@ module pd_loaded_platen
     procedure :: mark_prescribed
     procedure :: prescribe
     procedure :: share_forces
+    procedure :: mark_read
     procedure :: take_reactions
     procedure :: work
     procedure :: applied => applied_at
@@ -119,6 +120,15 @@ contains
         + self%factor%rate(t_next)) * self%full(c) * v(self%points(1), c)
     end do
   end function work
+
+  !> Its work is that on the velocity of one of its points.
+  pure subroutine mark_read(self, held, pushed)
+    class(loaded_platen_t), intent(in)    :: self
+    logical,                intent(inout) :: held(:), pushed(:)
+
+    held(self%points) = .true.
+    pushed(self%points(1)) = .true.
+  end subroutine mark_read
 
   pure function applied_at(self, t) result(force)
     class(loaded_platen_t), intent(in) :: self

@@ -84,11 +84,11 @@ contains
   end function no_acceleration
 
   !> Mark the points whose velocity the load looks at, where these are a few: here there are none.
-  pure subroutine mark_nothing(self, marked)
+  pure subroutine mark_nothing(self, pushed)
     class(load_t), intent(in)    :: self
-    logical,       intent(inout) :: marked(:)      !! (n)
+    logical,       intent(inout) :: pushed(:)      !! (n)
 
-    associate (unused => self, unchanged => marked)
+    associate (unused => self, unchanged => pushed)
     end associate
   end subroutine mark_nothing
 

@@ -321,11 +321,11 @@ contains
     if (self%ramp_time > 0.0_wp) text = text//', whole from '//short_number(self%ramp_time)//' s'
   end function description
 
-  pure subroutine mark_read(self, marked)
+  pure subroutine mark_read(self, pushed)
     class(pressure_t), intent(in)    :: self
-    logical,           intent(inout) :: marked(:)
+    logical,           intent(inout) :: pushed(:)
 
-    marked(self%points) = .true.
+    pushed(self%points) = .true.
   end subroutine mark_read
 
 end module pd_pressure

@@ -110,12 +110,15 @@ contains
     end associate
   end subroutine share_nothing
 
-  !> Mark the points whose displacement, velocity or force the support looks at: its own.
-  pure subroutine mark_points(self, marked)
+  !> Mark the points whose force and displacement the support looks at: its own; and those whose
+  !> velocity it looks at: none.
+  pure subroutine mark_points(self, held, pushed)
     class(support_t), intent(in)    :: self
-    logical,          intent(inout) :: marked(:)      !! (n)
+    logical,          intent(inout) :: held(:), pushed(:)   !! (n)
 
-    marked(self%points) = .true.
+    associate (unchanged => pushed)
+    end associate
+    held(self%points) = .true.
   end subroutine mark_points
 
   !> Velocity that the support prescribes for component c of all its points; a table without times

@@ -72,21 +72,24 @@ contains
   !> Which rows are known to all ranks.
   subroutine share_rows(model)
     type(model_t), intent(inout) :: model
-    logical, allocatable :: marked(:)
+    logical, dimension(model%operators%n) :: held, pushed, probed
     integer :: k
 
-    allocate (marked(model%operators%n), source=.false.)
-    do k = 1, size(model%probes)
-      marked(model%probes(k)%row) = .true.
-    end do
-    if (any(marked)) model%probed = new_shared_rows(marked, model%blocks)
+    held = .false.
+    pushed = .false.
+    probed = .false.
     do k = 1, size(model%supports%items)
-      call model%supports%items(k)%support%mark_read(marked)
+      call model%supports%items(k)%support%mark_read(held, pushed)
     end do
     do k = 1, size(model%loads%items)
-      call model%loads%items(k)%load%mark_read(marked)
+      call model%loads%items(k)%load%mark_read(pushed)
     end do
-    model%shared = new_shared_rows(marked, model%blocks)
+    do k = 1, size(model%probes)
+      probed(model%probes(k)%row) = .true.
+    end do
+    model%shared = new_shared_rows(held, model%blocks)
+    model%pushed = new_shared_rows(pushed, model%blocks)
+    model%probed = new_shared_rows(probed, model%blocks)
   end subroutine share_rows
 
   !> Points in each block that results show: the same in all stages.
@@ -130,6 +133,7 @@ contains
     type(state_t), intent(inout) :: state
 
     call model%shared%bring(state%displacement)
+    call model%probed%bring(state%displacement)
     call model%probed%bring(state%displacement_gradient)
     call model%probed%bring(state%stress)
     call model%probed%bring(state%history)

@@ -43,7 +43,8 @@ contains
       call internal_forces(model%operators, model%materials, points%volume, state, work, timing, &
         failed_row)
       call model%loads%add_forces(points%volume, t, state%force)
-      call model%shared%bring_both(state%force, state%velocity)
+      call model%shared%bring(state%force)
+      call model%pushed%bring(state%velocity)
       call model%supports%share_forces(points%volume, t, state%force)
       call model%supports%take_reactions(points%volume, t, state%force)
     end associate

@@ -155,7 +155,7 @@ contains
     if (allocated(model%operators%relaxing)) call model%operators%relaxing%follow(0.0_wp)
     call forces(model, t + duration, state, relaxation%blocks, timing, failed_row)
     state%velocity = (state%displacement - relaxation%displacement) / duration
-    call model%shared%bring(state%velocity)
+    call model%pushed%bring(state%velocity)
   end subroutine settle
 
   !> Work of the increment. That of supports and loads follows from the forces at both ends; what

@@ -35,7 +35,8 @@ module pd_model
     class(operators_t), allocatable :: operators
     type(materials_t) :: materials
     type(blocks_t)    :: blocks              !! of the rows of all fields; those of this rank
-    type(shared_rows_t) :: shared            !! rows that supports and loads look at
+    type(shared_rows_t) :: shared            !! rows whose force and displacement supports look at
+    type(shared_rows_t) :: pushed            !! rows whose velocity loads look at
     type(shared_rows_t) :: probed            !! those of the probes
     type(points_t)    :: points
     type(platens_t)   :: platens

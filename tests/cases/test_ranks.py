@@ -16,11 +16,12 @@ import frozen_cases
 import h5py
 import pytest
 from case_files import SPECIMEN, changed, groups_of, uncontrolled
+from test_bearings import BOX, HALF, MOTION, REST
 from test_equilibrium import RESTING
 from test_ground import CLAY, COLUMN, EQUILIBRIUM, FOOTING, MOVING
 from test_stages import BAR, BLOCKS
 
-TIME_LIMIT = 60.0
+TIME_LIMIT = 300.0
 ENVIRONMENT = {
     "OMP_NUM_THREADS": "1",
     "OMP_WAIT_POLICY": "passive",
@@ -121,7 +122,8 @@ def same_results(one, other):
     """Assert that history, frames and the last checkpoint are the same, bit by bit."""
     for name in ("case_history.csv", "case.xdmf"):
         assert (one / name).read_bytes() == (other / name).read_bytes(), name
-    same_file(one / "case.h5", other / "case.h5", ("points", "frames", "history"))
+    groups = ("points", "frames", "history", "doubts", "quality")
+    same_file(one / "case.h5", other / "case.h5", groups)
     same_file(one / "case_checkpoint.h5", other / "case_checkpoint.h5", ("/",))
 
 
@@ -141,6 +143,7 @@ def keeping(text):
 FROZEN = frozen_cases.CASES
 PROBES = "&probe name = 'a', x = 3.0, y = -1.0 /\n&probe name = 'b', x = 5.8, y = -0.3 /\n"
 FINE_CLAY = CLAY.replace("spacing = 0.25, horizon = 0.5", "spacing = 0.125, horizon = 0.375")
+FINE_BOX = BOX.replace("spacing = 0.1, horizon = 0.3", "spacing = 0.05, horizon = 0.15")
 FINE_COLUMN = COLUMN.replace("spacing = 0.25, horizon = 0.5", "spacing = 0.125, horizon = 0.375")
 CASES = {
     "lattice": finer(FROZEN["lattice"]),
@@ -157,6 +160,10 @@ CASES = {
         RESTING, spacing="0.05", horizon="0.16", final_strain="0.005"
     ).replace("increments = 100", "increments = 20").replace("= 0.004, 0.01", "= 0.004"),
     "stages": BLOCKS,
+    "bearings": FINE_BOX.replace("-8.0e-5", "-0.05") + MOTION.replace("0.4", "0.1"),
+    "bearings in a list": FINE_BOX.replace("'case',", "'case', operators = 'list',")
+    + MOTION.replace("0.4", "0.05"),
+    "bearings at equilibrium": HALF + REST.replace("1.0e-11", "1.0e-3"),
     "factor of safety": BAR.replace("tolerance = 0.01", "tolerance = 0.5"),
 }  # fmt: skip
 
@@ -295,3 +302,54 @@ def test_a_file_that_cannot_be_written_ends_all_ranks(run, tmp_path):
     status, said, _ = run(LONG, "ranks", 3)
     assert status == 5
     assert said.count("perigeo: error:") == 1
+
+
+def test_a_disk_that_fills_up_ends_all_ranks_and_costs_no_step(ranked, run, tmp_path):
+    text = changed(SPECIMEN, history_count="5000", final_strain="0.05")
+    text = text.replace("frame_strains = 0.004, 0.01", "frame_strains = 1.0e-4, 0.05")
+    folder = tmp_path / "ranks"
+    folder.mkdir()
+    (folder / "run.nml").write_text(uncontrolled(text))
+    # a limit on the size of files: the .h5 has its space from the start, the .csv grows beyond it
+    limited = f"trap '' XFSZ; ulimit -f 2560; exec '{ranked}' --quiet run.nml"  # of 512 bytes
+    done = subprocess.run(
+        ["mpirun", "-n", "3", "sh", "-c", limited],
+        cwd=folder,
+        env={**os.environ, **ENVIRONMENT, "OMPI_MCA_btl": "self,tcp"},
+        check=False,
+        capture_output=True,
+        text=True,
+        timeout=TIME_LIMIT,
+    )
+    assert done.returncode == 5, done.stderr
+    assert done.stderr.count("case_history.csv") == 1
+    assert done.stderr.count("--restart goes on from it") == 1
+    assert rows_written(folder / "out") > 100
+    with h5py.File(folder / "out" / "case.h5", locking=False) as file:
+        assert file["frames/000001"].attrs["written"] == 1
+    # the checkpoint of all ranks is written although one of them alone knew of the disk
+    status, said, results = run(text, "ranks", 2, "--restart")
+    assert status == 0, said
+    status, said, serial = run(text, "serial", 0)
+    assert status == 0, said
+    name = "case_history.csv"
+    assert (results / name).read_bytes() == (serial / name).read_bytes()
+    same_file(results / "case.h5", serial / "case.h5", ("points", "frames", "history"))
+
+
+def test_a_run_that_goes_on_or_is_finished_is_left_alone(start, run, tmp_path):
+    out = tmp_path / "ranks" / "out"
+    process = start(LONG, "ranks", 2)
+    wait_for_rows(process, out, 10)
+    waiting = ranks_of(process.pid)[1]
+    os.kill(waiting, signal.SIGSTOP)
+    for ranks, options in ((2, ("--force",)), (3, ("--restart",)), (0, ("--restart",))):
+        status, said, _ = run(LONG, "ranks", ranks, *options)
+        assert status == 5
+        assert said.count("another run writes these results") == 1
+    os.kill(waiting, signal.SIGCONT)
+    assert process.wait(TIME_LIMIT) == 0
+    before = (out / "case.h5").read_bytes()
+    assert run(LONG, "ranks", 3, "--restart")[0] == 0
+    assert (out / "case.h5").read_bytes() == before
+    assert not (out / "case.lock").exists()
