@@ -32,6 +32,7 @@ PAGES = {
     "doc/model.md": "model",
     "doc/studies.md": "studies",
     "doc/results.md": "results",
+    "doc/reliability.md": "reliability",
     "doc/theory.md": "theory",
     "doc/design.md": "design",
     "doc/verification.md": "verification",
