@@ -10,9 +10,11 @@ module pd_check
   use pd_input_types, only: all_keys
   use pd_kinds, only: wp
   use pd_points_file, only: write_points
+  use pd_room, only: machine_memory
   use pd_run, only: run_t
+  use pd_size, only: memory_in_words
   use pd_stability, only: find_highest_frequency
-  use pd_summary, only: estimated_seconds, summarise, summary_t
+  use pd_summary, only: estimated_seconds, memory_of_run, summarise, summary_t
   use pd_version, only: code_version, git_hash
   implicit none
   private
@@ -58,6 +60,9 @@ contains
     call outcome%end_if_any(errors, exit_file)
     if (outcome%done) return
     call find_highest_frequency(run%model)
+    associate (bytes => memory_of_run(run%input, run%model))   ! a run is refused for it
+      if (bytes > machine_memory()) write (output_unit, '(a)') 'warning: '//memory_in_words(bytes)
+    end associate
     summary = summarise(run%input, run%model, run%clock, run%schedule)
     write (output_unit, '(a)') path//': the input is right'
     do i = 1, size(summary%lines)

@@ -29,6 +29,7 @@ module pd_run
   use pd_setup, only: set_up_model
   use pd_setup_schedule, only: set_up_schedule
   use pd_setup_stages, only: set_up_stage_body, set_up_whole
+  use pd_size, only: look_at_memory, look_at_size
   use pd_stages, only: stage_t, stages_of
   use pd_state, only: state_t
   use pd_step, only: step_work_t
@@ -88,7 +89,8 @@ contains
     if (outcome%done) return
 
     allocate (run%stages, source=stages_of(run%input))
-    call set_up_bodies(run, input_errors, errors)
+    call look_at_size(run%input, options%check, errors)
+    if (errors%count() == 0) call set_up_bodies(run, input_errors, errors)
     call outcome%end_if_any(input_errors, exit_input)
     call outcome%end_if_any(errors, exit_model)
     if (outcome%done) return
@@ -100,7 +102,7 @@ contains
       if (outcome%done) return
     end if
     call set_up_model(run%input, run%model, errors, run%stages(run%checkpoint%clock%stage))
-    call try_later_stages(run, errors)
+    call try_later_stages(run, options%check, errors)
     call outcome%end_if_any(errors, exit_model)
     if (outcome%done) return
     call keep_standing_load(run, run%stages(run%checkpoint%clock%stage), run%model)
@@ -139,9 +141,11 @@ contains
       run%model%body, run%doubts, input_errors, errors)
   end subroutine set_up_bodies
 
-  !> Set up the models of all stages before the first one runs.
-  subroutine try_later_stages(run, errors)
+  !> Set up the models of all stages before the first one runs, and look whether there is memory
+  !> for the run, unless it is only checked.
+  subroutine try_later_stages(run, only_checked, errors)
     type(run_t),        intent(in)    :: run
+    logical,            intent(in)    :: only_checked
     type(error_list_t), intent(inout) :: errors
     type(doubts_t) :: unheard
     type(model_t) :: model, empty
@@ -156,6 +160,8 @@ contains
       if (errors%count() == 0) call set_up_model(run%input, model, errors, run%stages(k))
       if (errors%count() > 0) call errors%add('that is in the stage '''//run%stages(k)%name//'''')
     end do
+    if (errors%count() == 0 .and. .not. only_checked) &
+      call look_at_memory(run%input, run%model, errors)
   end subroutine try_later_stages
 
   !> Increments of the present stage.
@@ -237,7 +243,8 @@ contains
       call look_for_end(run%input, complete, same)
       if (complete .and. same) then
         if (.not. options%quiet) write (output_unit, '(a)') 'the run is finished: '// &
-          stem_of(run)//'.h5 is complete; a later end goes on from a checkpoint, --force begins anew'
+          stem_of(run)//'.h5 is complete; a later end goes on from a checkpoint, --force begins '// &
+          'anew'
         call outcome%end_with(exit_ok)
         return
       end if
