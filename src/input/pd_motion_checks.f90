@@ -34,7 +34,7 @@ contains
       if (errors%count() >= max_problems) return
       group = group_named(groups, 'boundary', k, input%path)
       call check_name(input%boundaries, k, group, errors)
-      call check_side(input, k, group, errors)
+      if (.not. any_damaged(groups, 'boundary')) call check_side(input, k, group, errors)
       call check_movement(input%boundaries(k), group, errors)
     end do
     call check_integration(input, group_named(groups, 'integration', 1, input%path), errors)
