@@ -78,7 +78,8 @@ contains
     if (input_errors%count() > 0) return
     do k = 1, size(names)
       if (.not. any(body%boundary == k)) &
-        call errors%add('a boundary holds no point', '&boundary name = '//trim(names(k)))
+        call errors%add('a boundary holds no point', '&boundary name = '//trim(names(k)), &
+                        'no such name in column 4 of '//trim(input%bodies(1)%file))
     end do
   end subroutine cloud_body
 
