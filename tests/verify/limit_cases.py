@@ -315,7 +315,7 @@ CASES: dict[str, Case] = {
             Variant("active", "wall_active", settled("wall", -1.0), 15.0, 15.0, 2.0e-2),
             Variant("passive", "wall_passive", settled("wall"), 45.0, 45.0, 2.0e-2),
         ),
-        HEIGHT,
+        HEIGHT[1:],
         wedge_behind_wall,
         "45 degrees",
         (-0.3, 2.5, -0.3, 1.1),
