@@ -37,6 +37,7 @@ module pd_run
   use pd_step_limit, only: new_step_limit, step_limit_t
   use pd_summary, only: summarise, summary_t
   use pd_tables, only: new_table
+  use pd_threads, only: choose_threads, spare_threads
   use pd_timing, only: timing_t
   use pd_version, only: build_flags, code_version, git_hash
   implicit none
@@ -91,6 +92,7 @@ contains
 
     allocate (run%stages, source=stages_of(run%input))
     call look_at_size(run%input, options%check, errors)
+    call spare_threads(options%threads, run%input)
     if (errors%count() == 0) call set_up_bodies(run, input_errors, errors)
     call outcome%end_if_any(input_errors, exit_input)
     call outcome%end_if_any(errors, exit_model)
@@ -128,6 +130,7 @@ contains
       call start_increments(run)
       if (run%clock%step == 0) call begin_increments(run%increments, run%schedule, run%clock)
     end if
+    call choose_threads(options%threads, run%model)
     call begin_state(run)
   end subroutine set_up_run
 

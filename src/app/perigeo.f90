@@ -32,7 +32,7 @@ program perigeo
   if (options%threads > 0) call omp_set_num_threads(options%threads)
   if (.not. outcome%done) call set_up_run(options, run, outcome)
   if (options%check .and. .not. outcome%done) &
-    call print_check(options%input_path, options%points_path, run, outcome)
+    call print_check(options%input_path, options%points_path, options%threads, run, outcome)
   call catch_signals()
   if (.not. outcome%done) call open_outputs(options, run, outcome)
   do while (.not. outcome%done .and. .not. run%schedule%is_over(run%clock))
