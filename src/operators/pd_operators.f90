@@ -20,9 +20,8 @@
 !>   force_block(lo, hi, u, f)           for every block
 !>
 !> Realisations: `pd_bond_list` for any points, `pd_balanced_list` off lattices, `pd_lattice` on
-!> them. Set-up chooses; nothing else knows which. Each provides the sums G, D, Z and S. Where its
-!> weights leave out the volume of the neighbour, fields are first multiplied by its share. Families
-!> hold what a point sees (`pd_sight`).
+!> them; set-up chooses. Each provides the sums G, D, Z and S. Where its weights leave out the
+!> volume of the neighbour, fields are first multiplied by its share. Families: see `pd_sight`.
 !> Source: doc/theory.md, sections 2, 4 and 5.
 module pd_operators
   use pd_blocks, only: blocks_t
