@@ -15,6 +15,7 @@ module pd_check
   use pd_size, only: memory_in_words
   use pd_stability, only: find_highest_frequency
   use pd_summary, only: estimated_seconds, memory_of_run, summarise, summary_t
+  use pd_threads, only: choose_threads
   use pd_version, only: code_version, git_hash
   implicit none
   private
@@ -47,9 +48,10 @@ contains
   end subroutine answer_questions
 
   !> Print the derived figures of a run that is set up; the program then ends.
-  subroutine print_check(path, points_path, run, outcome)
+  subroutine print_check(path, points_path, threads, run, outcome)
     character(*),    intent(in)    :: path          !! of the input file
     character(*),    intent(in)    :: points_path   !! file for the points; '': none
+    integer,         intent(in)    :: threads       !! asked for, 0: not
     type(run_t),     intent(inout) :: run
     type(outcome_t), intent(inout) :: outcome
     type(error_list_t) :: errors
@@ -68,6 +70,7 @@ contains
     do i = 1, size(summary%lines)
       write (output_unit, '(a)') trim(summary%lines(i))
     end do
+    call choose_threads(threads, run%model)
     call print_estimate(estimated_seconds(run%model, run%schedule))
     call run%doubts%print(output_unit)
     call outcome%end_with(exit_ok)

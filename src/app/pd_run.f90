@@ -4,6 +4,7 @@ module pd_run
   use omp_lib, only: omp_get_max_threads
   use pd_body_force, only: body_force_t, new_body_force
   use pd_checkpoint, only: checkpoint_mark, checkpoint_t
+  use pd_checkpoint_fit, only: same_history, same_points
   use pd_clock, only: clock_t
   use pd_command_line, only: options_t
   use pd_doubt_list, only: doubts_t
@@ -22,7 +23,7 @@ module pd_run
   use pd_plausibility, only: look_at_model, look_at_motion
   use pd_record, only: largest_reaction_before, load_checkpoint, load_doubts, look_for_end, &
     observe_state, open_record, record_doubts, record_frame, record_line, record_progress, &
-    record_row, record_t, results_in_the_way, same_history, same_points
+    record_row, record_t, results_in_the_way
   use pd_reversal, only: new_reversal, reversal_t
   use pd_run_description, only: provenance_t
   use pd_schedule, only: schedule_t
@@ -36,6 +37,7 @@ module pd_run
   use pd_step_limit, only: new_step_limit, step_limit_t
   use pd_summary, only: summarise, summary_t
   use pd_tables, only: new_table
+  use pd_threads, only: choose_threads, spare_threads
   use pd_timing, only: timing_t
   use pd_version, only: build_flags, code_version, git_hash
   implicit none
@@ -90,6 +92,7 @@ contains
 
     allocate (run%stages, source=stages_of(run%input))
     call look_at_size(run%input, options%check, errors)
+    call spare_threads(options%threads, run%input)
     if (errors%count() == 0) call set_up_bodies(run, input_errors, errors)
     call outcome%end_if_any(input_errors, exit_input)
     call outcome%end_if_any(errors, exit_model)
@@ -127,6 +130,7 @@ contains
       call start_increments(run)
       if (run%clock%step == 0) call begin_increments(run%increments, run%schedule, run%clock)
     end if
+    call choose_threads(options%threads, run%model)
     call begin_state(run)
   end subroutine set_up_run
 
@@ -243,8 +247,8 @@ contains
       call look_for_end(run%input, complete, same)
       if (complete .and. same) then
         if (.not. options%quiet) write (output_unit, '(a)') 'the run is finished: '// &
-          stem_of(run)//'.h5 is complete; a later end goes on from a checkpoint, --force begins '// &
-          'anew'
+          stem_of(run)//'.h5 is complete; a later end goes on from a checkpoint, --force '// &
+          'begins anew'
         call outcome%end_with(exit_ok)
         return
       end if

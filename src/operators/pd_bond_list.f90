@@ -13,6 +13,7 @@ module pd_bond_list
   use pd_room, only: has_room
   use pd_sight, only: sight_t
   use pd_storage, only: listed_storage
+  use pd_stretches, only: new_stretches
   implicit none
   private
 
@@ -60,6 +61,7 @@ contains
     operators%n = n
     operators%storage = listed_storage(n)
     operators%domain = new_domain(1, n)
+    operators%stretches = new_stretches(operators%domain%blocks, spread(.true., 1, n))
     allocate (operators%position(n, 2), source=position)
     call sort_into_cells(position, horizon%delta, cells)
     most = largest_neighbourhood(cells)

@@ -435,17 +435,3 @@ def test_a_run_with_settings_stores_them_beside_the_file(run_case, tmp_path):
         values = [line.strip() for line in results["input/values"].asstr()[()]]
         assert "material.density = 1800.0" in values
         assert b"--set material.density=1800" in bytes(results.attrs["command_line"])
-
-
-def test_a_restart_asks_for_the_same_settings(run_case, tmp_path):
-    case = VALID.replace("&output", "&output checkpoint_every = 1.0e-6,")
-    settings = ["--set", "material.density=1800"]
-    done = run_case(case, tmp_path, *settings, "--quiet")
-    assert done.returncode == 0, done.stderr
-    done = run_case(case, tmp_path, "--restart", "--quiet")
-    assert done.returncode == 2
-    assert "material.density: differs from the run that is to go on" in done.stderr
-    assert "found: 2000.0; allowed: 1800.0" in done.stderr
-    later = [*settings, "--set", "integration.final_strain=0.0011"]
-    done = run_case(case, tmp_path, *later, "--restart", "--quiet")
-    assert done.returncode == 0, done.stderr

@@ -418,3 +418,25 @@ def test_a_check_of_a_large_body_speaks_first(program, tmp_path):
         assert process.poll() is None
     process.kill()
     process.wait()
+
+
+# ------------------------------------------------------------------------------ threads
+
+
+def test_a_small_body_takes_one_thread_unless_the_user_says_more(program, tmp_path):
+    text = changed(SPECIMEN, final_strain=None).replace("frame_strains = 0.004, 0.01, ", "")
+    (tmp_path / "run.nml").write_text(
+        text.replace("&integration", "&integration end_time = 0.01, time_step_rule = 'courant',")
+    )
+    free = {name: value for name, value in os.environ.items() if name != "OMP_NUM_THREADS"}
+    two = {**free, "OMP_NUM_THREADS": "2"}
+    for options, environment, threads in (
+        ([], free, 1),
+        ([], two, 2),
+        (["--threads", "2"], free, 2),
+    ):
+        subprocess.run(
+            [program, "--quiet", "--force", *options, "run.nml"], cwd=tmp_path, env=environment,
+            check=True,
+        )  # fmt: skip
+        assert attributes(tmp_path / "out" / "case.h5")["threads"] == threads

@@ -204,7 +204,7 @@ def band_words(measure: BandMeasure) -> str:
         f"Prevailing band, {strong.angle:.1f}° ± {strong.angle_uncertainty:.1f}° to the loading "
         f"axis\nweaker over stronger band {measure.bands.ratio:.2f}\n"
         f"width at {100.0 * width.level:g} % of the peak of {width.peak:.3g}:\n"
-        f"between points {sign}{between:.4g} {unit} ± {factor * width.uncertainty:.2g} {unit}, "
+        f"between points {sign}{between:.4g} {unit} ± {factor * width.uncertainty:.2g} {unit},\n"
         f"fitted along the band {fitted:.4g} {unit}\n"
         f"line from {ends[0]} {unit} to {ends[1]} {unit}"
     )
