@@ -214,9 +214,10 @@ endif
 # do it. What it gains is in doc/performance.md; ALIGNED=0 goes without.
 # Folders come first: what make has looked for and not found, it does not look for again.
 update := $(shell mkdir -p $(build)/try $(build)/unit bin)
+wrapped := -Wl,--wrap=malloc,--wrap=realloc,--wrap=calloc
 ifneq ($(ALIGNED),0)
   aligned := $(shell echo end | $(FC) -J$(build)/try src/system/pd_memory.f90 -x f95 - \
-    -Wl,--wrap=malloc -o $(build)/try/link 2>/dev/null && echo -Wl,--wrap=malloc)
+    $(wrapped) -o $(build)/try/link 2>/dev/null && echo $(wrapped))
 endif
 left_out := $(if $(aligned),,pd_memory)
 

@@ -33,6 +33,7 @@ PAGES = {
     "doc/choices.md": "choices",
     "doc/studies.md": "studies",
     "doc/results.md": "results",
+    "doc/reliability.md": "reliability",
     "doc/theory.md": "theory",
     "doc/design.md": "design",
     "doc/verification.md": "verification",

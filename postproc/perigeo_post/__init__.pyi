@@ -22,6 +22,7 @@ from .measure.curves import Curve as Curve
 from .measure.curves import Modulus as Modulus
 from .measure.curves import apparent_modulus as apparent_modulus
 from .measure.curves import axial_stress as axial_stress
+from .measure.curves import column_curves as column_curves
 from .measure.curves import curve_numbers as curve_numbers
 from .measure.curves import energy_curves as energy_curves
 from .measure.curves import history_curve as history_curve

@@ -12,7 +12,7 @@ import synthetic
 from PIL import Image
 from test_figures import assert_drawn
 
-from perigeo_post import Run, contour_figure
+from perigeo_post import Run, column_curves, contour_figure, curve_figure
 from perigeo_post.cli.command_line import COMMANDS, main
 
 Capture = pytest.CaptureFixture[str]
@@ -116,6 +116,23 @@ def test_curves_draw_and_print(result: Path, tmp_path: Path, capsys: Capture) ->
         figure = tmp_path / "f.pdf"
         assert main(["curves", str(result), *options, "-o", str(figure)]) == 0
         assert_drawn(figure)
+
+
+def test_any_column_is_drawn_against_any(result: Path, tmp_path: Path, capsys: Capture) -> None:
+    table, figure = tmp_path / "c.csv", tmp_path / "c.png"
+    argv = ["curves", result, "--x", "plastic_dissipation", "--y", "bottom_force_y", "top_force_y"]
+    both = numbers(capsys, *argv, "--json", "--csv", table, "-o", figure)
+    assert_drawn(figure)
+    assert [c["run"] for c in both] == ["bottom force y", "top force y"]
+    assert [c["y"]["unit"] for c in both] == ["N/m", "N/m"]
+    assert both[0]["x"] == both[1]["x"]
+    assert table.read_text().startswith("curve,x_name,x_unit,x,y_name,y_unit,y\n")
+    axes = curve_figure(column_curves([Run(result)], argv[5:7], argv[3])).axes[0]
+    assert axes.get_xlabel() == "Plastic dissipation [J/m]"
+    assert axes.get_ylabel() == "Force y [kN/m]"
+    one = numbers(capsys, "curves", result, "--column", "strain_energy", "--against", "time",
+                  "--json")  # fmt: skip
+    assert (one["x"]["name"], one["y"]["name"]) == ("time", "strain_energy")
 
 
 def test_json_and_a_figure_can_be_had_together(
@@ -234,7 +251,9 @@ def test_wrong_command_lines_end_with_status_1(
     assert "no column" in refused(capsys, 1, "curves", result, "--column", "nothing")
     assert "must end in" in refused(capsys, 1, "curves", result, "-o", tmp_path / "x.jpg")
     assert "2 labels" in refused(capsys, 1, "curves", result, "--labels", "a", "b")
-    assert "--against" in refused(capsys, 1, "curves", result, "--against", "time")
+    assert "--x goes with --y" in refused(capsys, 1, "curves", result, "--against", "time")
+    units = refused(capsys, 1, "curves", result, "--y", "top_force_x", "kinetic_energy")
+    assert "different units" in units
 
 
 def test_files_that_cannot_be_read_end_with_status_2(

@@ -76,6 +76,22 @@ def test_the_file_for_meshio_names_data_sets_of_the_result(result: Path, tmp_pat
     assert np.array_equal(fields["stress"], frame["stress"])
 
 
+@pytest.mark.parametrize("form", ["vtu", "xdmf"])
+def test_export_replaces_its_like_and_nothing_else(
+    result: Path, tmp_path: Path, form: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    folder = tmp_path / "out"
+    given = ["export", str(result), "--format", form, "-o", str(folder)]
+    assert main(given) == 0
+    assert main(given) == 0
+    made = next(path for path in folder.iterdir() if path.suffix in (".vtu", ".xdmf"))
+    if form == "vtu":
+        made.write_text("my notes, not a result\n")
+        assert main(given) != 0
+        assert "not overwritten" in capsys.readouterr().err
+        assert made.read_text() == "my notes, not a result\n"
+
+
 def test_what_cannot_be_exported_is_named(
     result: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -113,13 +113,13 @@ def test_points_that_are_not_there_or_not_finite_take_no_part(result: Path) -> N
 
 def test_pictures_say_that_they_are_smoothed(result: Path, tmp_path: Path) -> None:
     frame = Run(result).last_frame
-    shape = contour_figure([smoothed(frame)], deformed=10.0).get_suptitle()
+    shape = contour_figure([smoothed(frame)], deformed=10.0)._suptitle.get_text()
     assert shape == "Deformed shape, displacements × 10, smoothed over families"
-    field = contour_figure([smoothed(frame)], "displacement_y").get_suptitle()
+    field = contour_figure([smoothed(frame)], "displacement_y")._suptitle.get_text()
     assert field == "Displacements smoothed over families"
-    assert contour_figure([frame], deformed=10.0).get_suptitle() == shape.rpartition(",")[0]
+    assert contour_figure([frame], deformed=10.0)._suptitle.get_text() == shape.rpartition(",")[0]
     figure: Any = compare_figure([Run(result)], deformed=5.0, smooth=True)
-    assert "smoothed" in figure.get_suptitle()
+    assert "smoothed" in figure._suptitle.get_text()
     assert animate([smoothed(frame)], tmp_path / "a.gif", deformed=5.0, dpi=50).exists()
     with pytest.raises(RequestError, match="no displacement to smooth in a picture of 'det_f'"):
         smoothed_for(frame, "det_f", None)

@@ -422,7 +422,7 @@ def test_what_is_no_toml_is_one_mistake(wrong: Any, inputs: Inputs, tmp_path: Pa
     with pytest.raises(StudyError, match="cannot be read: No such file"):
         load_study(tmp_path / "nothing.toml", KINDS, inputs)
     (tmp_path / "binary.toml").write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(StudyError, match="not a text"):
+    with pytest.raises(StudyError, match="this is not TOML"):
         load_study(tmp_path / "binary.toml", KINDS, inputs)
 
 

@@ -12,10 +12,13 @@ module pd_check
   use pd_kinds, only: wp
   use pd_points_file, only: write_points
   use pd_ranks, only: ranks_t
+  use pd_room, only: machine_memory
   use pd_run, only: run_t, words_on_cores
+  use pd_size, only: memory_in_words
   use pd_stability, only: find_highest_frequency
-  use pd_summary, only: estimated_seconds, summarise, summary_t
+  use pd_summary, only: estimated_seconds, memory_of_run, summarise, summary_t
   use pd_text, only: integer_text, short_number
+  use pd_threads, only: choose_threads
   use pd_version, only: code_version, git_hash
   implicit none
   private
@@ -55,9 +58,10 @@ contains
   end subroutine answer_questions
 
   !> Print the derived figures of a run that is set up; the program then ends.
-  subroutine print_check(path, points_path, run, outcome)
+  subroutine print_check(path, points_path, threads, run, outcome)
     character(*),    intent(in)    :: path          !! of the input file
     character(*),    intent(in)    :: points_path   !! file for the points; '': none
+    integer,         intent(in)    :: threads       !! asked for, 0: not
     type(run_t),     intent(inout) :: run
     type(outcome_t), intent(inout) :: outcome
     type(error_list_t) :: errors
@@ -72,12 +76,19 @@ contains
     call outcome%end_if_any(errors, exit_file)
     if (outcome%done) return
     call find_highest_frequency(run%model)
+    associate (bytes => memory_of_run(run%input, run%model))   ! a run is refused for it
+      if (bytes > machine_memory()) write (output_unit, '(a)') 'warning: '//memory_in_words(bytes)
+    end associate
     summary = summarise(run%input, run%model, run%clock, run%schedule)
     write (output_unit, '(a)') path//': the input is right'
     do i = 1, size(summary%lines)
       write (output_unit, '(a)') trim(summary%lines(i))
     end do
-    if (run%ranks%count > 1) call print_shares(run)
+    if (run%ranks%count > 1) then
+      call print_shares(run)
+    else
+      call choose_threads(threads, run%model)
+    end if
     call print_estimate(estimated_seconds(run%model, run%schedule))
     call run%doubts%print(output_unit)
     call outcome%end_with(exit_ok)

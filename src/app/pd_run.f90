@@ -4,6 +4,7 @@ module pd_run
   use omp_lib, only: omp_get_max_threads, omp_get_num_procs
   use pd_body_force, only: body_force_t, new_body_force
   use pd_checkpoint, only: checkpoint_mark, checkpoint_t
+  use pd_checkpoint_fit, only: same_history, same_points
   use pd_clock, only: clock_t
   use pd_command_line, only: options_t
   use pd_division, only: divide_model
@@ -24,13 +25,14 @@ module pd_run
   use pd_ranks, only: ranks_t
   use pd_record, only: largest_reaction_before, load_checkpoint, load_doubts, look_for_end, &
     observe_state, open_record, record_doubts, record_frame, record_line, record_progress, &
-    record_row, record_t, results_in_the_way, same_history, same_points
+    record_row, record_t, results_in_the_way
   use pd_reversal, only: new_reversal, reversal_t
   use pd_run_description, only: provenance_t
   use pd_schedule, only: schedule_t
   use pd_setup, only: set_up_model
   use pd_setup_schedule, only: set_up_schedule
   use pd_setup_stages, only: set_up_stage_body, set_up_whole
+  use pd_size, only: look_at_memory, look_at_size
   use pd_stages, only: stage_t, stages_of
   use pd_state, only: state_t
   use pd_step, only: step_work_t
@@ -39,6 +41,7 @@ module pd_run
   use pd_system, only: pending_signal
   use pd_tables, only: new_table
   use pd_text, only: integer_text
+  use pd_threads, only: choose_threads, spare_threads
   use pd_timing, only: timing_t
   use pd_version, only: build_flags, code_version, git_hash
   implicit none
@@ -114,7 +117,9 @@ contains
     if (outcome%done) return
 
     allocate (run%stages, source=stages_of(run%input))
-    call set_up_bodies(run, input_errors, errors)
+    call look_at_size(run%input, options%check, errors)
+    call spare_threads(options%threads, run%ranks%count, run%input)
+    if (errors%count() == 0) call set_up_bodies(run, input_errors, errors)
     call outcome%end_if_any(input_errors, exit_input)
     call outcome%end_if_any(errors, exit_model)
     if (outcome%done) return
@@ -126,7 +131,7 @@ contains
       if (outcome%done) return
     end if
     call set_up_model(run%input, run%model, errors, run%stages(run%checkpoint%clock%stage))
-    call try_later_stages(run, errors)
+    call try_later_stages(run, options%check, errors)
     call outcome%end_if_any(errors, exit_model)
     if (outcome%done) return
     call keep_standing_load(run, run%stages(run%checkpoint%clock%stage), run%model)
@@ -157,6 +162,7 @@ contains
       call start_increments(run)
       if (run%clock%step == 0) call begin_increments(run%increments, run%schedule, run%clock)
     end if
+    if (run%ranks%count == 1) call choose_threads(options%threads, run%model)
     call begin_state(run)
   end subroutine set_up_run
 
@@ -171,9 +177,11 @@ contains
       run%model%body, run%doubts, input_errors, errors)
   end subroutine set_up_bodies
 
-  !> Set up the models of all stages before the first one runs.
-  subroutine try_later_stages(run, errors)
+  !> Set up the models of all stages before the first one runs, and look whether there is memory
+  !> for the run, unless it is only checked.
+  subroutine try_later_stages(run, only_checked, errors)
     type(run_t),        intent(in)    :: run
+    logical,            intent(in)    :: only_checked
     type(error_list_t), intent(inout) :: errors
     type(doubts_t) :: unheard
     type(model_t) :: model, empty
@@ -188,6 +196,8 @@ contains
       if (errors%count() == 0) call set_up_model(run%input, model, errors, run%stages(k))
       if (errors%count() > 0) call errors%add('that is in the stage '''//run%stages(k)%name//'''')
     end do
+    if (errors%count() == 0 .and. .not. only_checked) &
+      call look_at_memory(run%input, run%model, errors)
   end subroutine try_later_stages
 
   !> Increments of the present stage.
@@ -314,7 +324,8 @@ contains
       call look_for_end(run%input, complete, same)
       if (.not. (complete .and. same)) return
       if (.not. options%quiet) write (output_unit, '(a)') 'the run is finished: '// &
-        stem_of(run)//'.h5 is complete; a later end goes on from a checkpoint, --force begins anew'
+        stem_of(run)//'.h5 is complete; a later end goes on from a checkpoint, --force '// &
+        'begins anew'
       call outcome%end_with(exit_ok)
     else
       call refuse_results(options, run, errors)

@@ -4,6 +4,7 @@ module pd_run_end
   use, intrinsic :: iso_fortran_env, only: error_unit, int64
   use pd_errors, only: error_list_t, exit_calculation, exit_file, outcome_t
   use pd_kinds, only: wp
+  use pd_lock, only: release_lock
   use pd_quality, only: tell_quality
   use pd_record, only: close_record, observe_state, record_failure, record_frame, record_line, &
     record_row, save_last_checkpoint
@@ -14,7 +15,7 @@ module pd_run_end
   implicit none
   private
 
-  public :: finish_run, end_without_equilibrium, fail, fastest_row, remedy, keep_state
+  public :: finish_run, end_without_equilibrium, fail, fastest_row, remedy, close_run
 
 contains
 
@@ -163,6 +164,16 @@ contains
     call outcome%end_if_any(errors, exit_file)
     call outcome%agree(run%ranks)
   end subroutine finish_run
+
+  !> Whatever the outcome: keep the state of a run that ends because of a file, and let others have
+  !> its results.
+  subroutine close_run(run, outcome)
+    type(run_t),     intent(inout) :: run
+    type(outcome_t), intent(inout) :: outcome
+
+    call keep_state(run, outcome)
+    call release_lock(run%lock)
+  end subroutine close_run
 
   !> A run that ends because of a file: keep its state, if that can be written.
   subroutine keep_state(run, outcome)

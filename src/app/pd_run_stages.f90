@@ -41,6 +41,7 @@ contains
     if (outcome%done .or. run%clock%stage >= size(run%stages)) return
     if (run%clock%time() < run%stages(run%clock%stage)%end_time * (1.0_wp - round_off)) return
     call set_up_next(run, model, outcome)
+    call outcome%agree(run%ranks)   ! one of them may be short of memory
     if (outcome%done) return
     call observe_state(run%model, run%state, run%ledger, run%clock, run%record)
     call carry_over(run, model)

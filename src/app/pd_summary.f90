@@ -17,7 +17,7 @@ module pd_summary
   implicit none
   private
 
-  public :: summary_t, summarise, estimated_seconds
+  public :: summary_t, summarise, estimated_seconds, memory_of_run
 
   integer, parameter :: line_length = 540   !! the longest title fits
 
@@ -93,7 +93,7 @@ contains
       call summary%add('disk', number((frames_on_disk(model, schedule) &
         + rows_on_disk(model, schedule)) / 1.0e6_wp)//' MB, of which frames '// &
         number(frames_on_disk(model, schedule) / 1.0e6_wp)//' MB')
-      call summary%add('memory', number(memory(input, model) / 1.0e6_wp)//' MB')
+      call summary%add('memory', number(memory_of_run(input, model) / 1.0e6_wp)//' MB')
     end associate
   end function summarise
 
@@ -246,7 +246,7 @@ contains
   !> the points (7 numbers), K^-1 (3), A (4), and what is needed at times: a field of a frame on its
   !> way to the disk (5), the points and a field of a checkpoint likewise (15), the search for the
   !> highest frequency of the strained body (21).
-  real(wp) function memory(input, model)
+  real(wp) function memory_of_run(input, model) result(memory)
     type(input_t), intent(in) :: input
     type(model_t), intent(in) :: model
     type(state_t) :: state
@@ -266,7 +266,7 @@ contains
     if (allocated(model%materials%stiffness)) numbers = numbers + 1
     if (model%at_equilibrium) numbers = numbers + numbers_per_row(state)
     memory = model%operators%memory() + real(model%operators%n, wp) * 8.0_wp * real(numbers, wp)
-  end function memory
+  end function memory_of_run
 
   !> Frames on the disk [bytes]: their numbers, and what names and describes them in both files.
   real(wp) function frames_on_disk(model, schedule) result(bytes)

@@ -10,10 +10,9 @@ program perigeo
   use pd_errors, only: error_list_t, exit_command_line, outcome_t
   use pd_exit, only: leave
   use pd_increment, only: take_increment
-  use pd_lock, only: release_lock
   use pd_ranks, only: begin_ranks
   use pd_run, only: open_outputs, run_t, set_up_run
-  use pd_run_end, only: end_without_equilibrium, finish_run, keep_state
+  use pd_run_end, only: close_run, end_without_equilibrium, finish_run
   use pd_run_stages, only: begin_stage_if_due
   use pd_run_steps, only: due_after_step, due_t, write_what_is_due
   use pd_step, only: take_step
@@ -36,7 +35,7 @@ program perigeo
   if (.not. outcome%done) call set_up_run(options, run, outcome)
   call outcome%agree(run%ranks)
   if (options%check .and. .not. outcome%done) &
-    call print_check(options%input_path, options%points_path, run, outcome)
+    call print_check(options%input_path, options%points_path, options%threads, run, outcome)
   call catch_signals()
   if (.not. outcome%done) call open_outputs(options, run, outcome)
   do while (.not. outcome%done .and. .not. run%schedule%is_over(run%clock))
@@ -62,7 +61,6 @@ program perigeo
   if (.not. outcome%done) call look_at_end(run, outcome)
   if (.not. (outcome%done .or. run%increments%lost)) call find_factor_of_safety(run, outcome)
   if (.not. outcome%done) call finish_run(run, outcome)
-  call keep_state(run, outcome)
-  call release_lock(run%lock)
+  call close_run(run, outcome)
   call leave(outcome, run%ranks)
 end program perigeo

@@ -204,7 +204,7 @@ contains
     real(wp), allocatable :: nodes(:), reached(:), slopes(:)
     integer :: k
 
-    nodes = [0.0_wp, pack(self%times, self%times > 0.0_wp)]
+    allocate (nodes, source=[0.0_wp, pack(self%times, self%times > 0.0_wp)])
     allocate (reached(size(nodes)), slopes(size(nodes)))
     do k = 1, size(nodes)
       reached(k) = self%integral(nodes(k))

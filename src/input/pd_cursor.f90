@@ -24,6 +24,7 @@ module pd_cursor
     procedure :: length_of_line
     procedure :: rest_of_line
     procedure :: next
+    procedure :: number_with_comma
   end type cursor_t
 
 contains
@@ -148,5 +149,27 @@ contains
     c = ''
     if (self%at <= len(self%text)) c = self%text(self%at:self%at)
   end function next
+
+  !> The digits on both sides of the comma at the cursor, as in 0,006; empty where a blank or a
+  !> point stands there.
+  pure function number_with_comma(self) result(word)
+    class(cursor_t), intent(in) :: self
+    character(:), allocatable :: word
+    character(*), parameter :: digits = '0123456789'
+    integer :: first, last
+
+    first = verify(self%text(:self%at - 1), digits, back=.true.) + 1
+    last = verify(self%text(self%at + 1:), digits)
+    last = merge(self%at + last - 1, len(self%text), last > 0)
+    word = ''
+    if (first == self%at .or. last == self%at) return
+    if (first > 1) then
+      if (self%text(first - 1:first - 1) == '.') return
+    end if
+    if (last < len(self%text)) then
+      if (self%text(last + 1:last + 1) == '.') return
+    end if
+    word = self%text(first:last)
+  end function number_with_comma
 
 end module pd_cursor

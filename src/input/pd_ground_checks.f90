@@ -99,7 +99,8 @@ contains
     surcharge = input%initial_stress%surcharge
     top = maxval(input%bodies%y_max, mask=there_at_first(input))   ! unset: a cloud, polygons
     associate (surface => input%initial_stress%surface_y)
-      if (.not. (is_set(surface) .and. is_set(top))) return
+      if (.not. (is_set(surface) .and. is_set(top) .and. &
+                 is_set(input%discretisation%spacing))) return
       slack = merge(1.0_wp, 1.0e-6_wp, input%discretisation%fit == 'nearest') &
         * input%discretisation%spacing
       if (surface < top - slack) call errors%add( &

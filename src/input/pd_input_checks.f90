@@ -96,6 +96,13 @@ contains
     character(*),           intent(in)    :: key, why
     type(error_list_t),     intent(inout) :: errors
 
+    character(*), parameter :: choosing(6) = [character(14) :: 'method', 'contact', 'shape', &
+                                              'role', 'time_step_rule', 'traction']
+    integer :: k
+
+    do k = 1, size(choosing)   ! what was meant there may give the key its effect
+      if (is_damaged(group, trim(choosing(k)))) return
+    end do
     if (is_given(group, key)) call errors%add('the key has no effect '//why, &
                                               where=place_of(group, key), allowed='leave it out')
   end subroutine add_useless
@@ -325,7 +332,7 @@ contains
     type(namelist_group_t), intent(in)    :: group
     type(error_list_t),     intent(inout) :: errors
 
-    if (is_damaged(group, 'factor')) return
+    if (is_damaged(group, 'factor') .or. is_damaged(group, 'method')) return
     associate (s => input%stabilisation)
       if (s%method /= 'relaxing') then
         call add_useless(group, 'relaxing_stiffness', 'without method = ''relaxing''', errors)

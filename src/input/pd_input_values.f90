@@ -9,13 +9,13 @@ module pd_input_values
     kind_integer, kind_text, words_of
   use pd_kinds, only: is_set, wp
   use pd_namelist, only: max_problems
-  use pd_namelist_groups, only: namelist_group_t, namelist_value_t, place_of
+  use pd_namelist_groups, only: namelist_entry_t, namelist_group_t, namelist_value_t, place_of
   use pd_text, only: integer_text, is_name, nearest_name, quoted_list, read_integer, &
     read_number, shortened
   implicit none
   private
 
-  public :: check_groups, group_named, count_groups, is_given, is_damaged
+  public :: check_groups, group_named, count_groups, is_given, is_damaged, any_damaged
   public :: did_you_mean, problem_of_range
 
 contains
@@ -142,10 +142,30 @@ contains
       found = integer_text(n)//merge(' value ', ' values', n == 1)
       if (key%count == 1) allowed = 'one value: '//allowed
     end if
+    if (is_decimal_comma(group%entries(i), key)) then
+      problem = 'a comma stands between values, the decimal sign is a point'
+      found = group%entries(i)%comma
+    end if
     if (problem == '') return
     call errors%add(problem, where=place, found=found, allowed=allowed)
     group%entries(i)%damaged = .true.
   end subroutine check_entry
+
+  !> Whether numbers are written with a comma: there are twice as many as the key takes, or what
+  !> follows a comma begins with a zero, as in 0,006.
+  pure logical function is_decimal_comma(entry, key)
+    type(namelist_entry_t), intent(in) :: entry
+    type(key_t),            intent(in) :: key
+    integer :: k
+
+    is_decimal_comma = .false.
+    if (.not. allocated(entry%comma) .or. key%kind == kind_text) return
+    k = index(entry%comma, ',')
+    if (k == 0) return
+    is_decimal_comma = size(entry%values) == 2 * key%count
+    if (len(entry%comma) > k + 1) is_decimal_comma = is_decimal_comma &
+      .or. entry%comma(k + 1:k + 1) == '0'
+  end function is_decimal_comma
 
   !> What is wrong with one value of a key; empty if nothing is.
   pure function problem_of(value, key) result(problem)
@@ -281,5 +301,17 @@ contains
     i = group%find(name)
     if (i > 0) is_damaged = group%entries(i)%damaged
   end function is_damaged
+
+  !> Whether any key of the groups of a name was found wrong.
+  pure logical function any_damaged(groups, name)
+    type(namelist_group_t), intent(in) :: groups(:)
+    character(*),           intent(in) :: name
+    integer :: i
+
+    any_damaged = .false.
+    do i = 1, size(groups)
+      if (groups(i)%name == name) any_damaged = any_damaged .or. any(groups(i)%entries%damaged)
+    end do
+  end function any_damaged
 
 end module pd_input_values

@@ -6,7 +6,7 @@ module pd_motion_checks
   use pd_errors, only: error_list_t
   use pd_input_checks, only: add_missing, add_useless, is_cloud
   use pd_input_types, only: boundary_input_t, input_t
-  use pd_input_values, only: group_named, is_damaged, is_given
+  use pd_input_values, only: any_damaged, group_named, is_damaged, is_given
   use pd_kinds, only: is_set, unset, wp
   use pd_namelist, only: max_problems
   use pd_namelist_groups, only: namelist_group_t, place_of
@@ -34,7 +34,7 @@ contains
       if (errors%count() >= max_problems) return
       group = group_named(groups, 'boundary', k, input%path)
       call check_name(input%boundaries, k, group, errors)
-      call check_side(input, k, group, errors)
+      if (.not. any_damaged(groups, 'boundary')) call check_side(input, k, group, errors)
       call check_movement(input%boundaries(k), group, errors)
     end do
     call check_integration(input, group_named(groups, 'integration', 1, input%path), errors)
@@ -276,6 +276,7 @@ contains
     type(table_t) :: approach
     real(wp) :: extent
 
+    if (any_damaged(groups, 'boundary')) return   ! what could not be read may be a platen's motion
     integration = group_named(groups, 'integration', 1, input%path)
     output = group_named(groups, 'output', 1, input%path)
     if (input%platens(1) == 0) then
@@ -297,11 +298,7 @@ contains
     subroutine refuse(group, key)
       type(namelist_group_t), intent(in) :: group
       character(*),           intent(in) :: key
-      integer :: k
 
-      do k = 1, size(input%boundaries)   ! a side that could not be read may be that of a platen
-        if (is_damaged(group_named(groups, 'boundary', k, input%path), 'side')) return
-      end do
       call errors%add('the key needs platens, and there are none', where=place_of(group, key), &
                       found=integer_text(size(input%boundaries))//' boundaries', &
                       allowed=needs_platens)

@@ -11,7 +11,9 @@
 module pd_namelist
   use pd_cursor, only: blanks, cursor_t, line_ends, quotes
   use pd_errors, only: error_list_t
+  use pd_foreign_letters, only: foreign_search_t
   use pd_namelist_groups, only: lengthen, namelist_entry_t, namelist_group_t, namelist_value_t
+  use pd_plain_text, only: make_plain
   use pd_text, only: integer_text, is_name, lower_case, read_integer, shortened
   implicit none
   private
@@ -50,7 +52,9 @@ contains
 
     scanner%file = path
     scanner%text = text
+    call make_plain(scanner%text)
     call check_characters(scanner, errors)
+    call check_letters(scanner, errors)
     allocate (list(16))
     n = 0
     do while (.not. scanner%stopped)
@@ -75,14 +79,11 @@ contains
   end subroutine scan_namelist
 
   !> Report control characters; a byte of zero means that this is no text file, and ends the scan.
-  !> The mark that some editors put before UTF-8 text is ignored.
   subroutine check_characters(scanner, errors)
     type(scanner_t),    intent(inout) :: scanner
     type(error_list_t), intent(inout) :: errors
-    character(*), parameter :: utf8_mark = char(239)//char(187)//char(191)
     integer :: code, first, i, line, n
 
-    if (index(scanner%text, utf8_mark) == 1) scanner%at = 4
     if (index(scanner%text, achar(0)) > 0) then
       call errors%add('the input file is not a text file', where=scanner%file, &
                       found='a byte of value 0')
@@ -105,6 +106,30 @@ contains
       scanner%text(i:i) = ' '
     end do
   end subroutine check_characters
+
+  !> Report quotes and minus signs of word processors, once for each line, and put them right.
+  subroutine check_letters(scanner, errors)
+    type(scanner_t),    intent(inout) :: scanner
+    type(error_list_t), intent(inout) :: errors
+    type(foreign_search_t) :: search
+    character(1) :: meant
+    integer :: line
+
+    line = 0
+    do
+      call search%next(scanner%text, meant)
+      if (meant == '') exit
+      if (search%line == line) cycle
+      line = search%line
+      if (meant == '-') then
+        call complain(scanner, errors, 'a minus sign that is not that of the keyboard', line, &
+                      'a dash or long minus sign', '-')
+      else
+        call complain(scanner, errors, 'a quotation mark that is not that of the keyboard', line, &
+                      'a curly quotation mark', "' or """)
+      end if
+    end do
+  end subroutine check_letters
 
   !> Text that belongs to no group: report it once, and go on at the next line that starts with `&`.
   subroutine skip_outside(scanner, errors)
@@ -260,6 +285,7 @@ contains
       if (scanner%next() == '' .or. scanner%next() == '/' .or. scanner%next() == '&') exit
       if (scanner%next() == ',') then
         if (comma_before) call damage('has an empty value', allowed='a value between commas')
+        if (.not. allocated(entry%comma)) entry%comma = scanner%number_with_comma()
         comma_before = .true.
         scanner%at = scanner%at + 1
         cycle

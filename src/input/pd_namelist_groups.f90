@@ -19,6 +19,7 @@ module pd_namelist_groups
     integer :: line = 0
     character(:), allocatable :: place                 !! where it was given, if not in the file
     logical :: damaged = .false.
+    character(:), allocatable :: comma                 !! its first number like 0,006, or empty
     type(namelist_value_t), allocatable :: values(:)
   end type namelist_entry_t
 

@@ -8,7 +8,7 @@ module pd_shape_checks
   use pd_input_checks, only: add_missing, add_useless, is_cloud
   use pd_input_shapes, only: body_number, outline
   use pd_input_types, only: body_input_t, boundary_input_t, input_t
-  use pd_input_values, only: did_you_mean, group_named, is_damaged, is_given
+  use pd_input_values, only: any_damaged, did_you_mean, group_named, is_damaged, is_given
   use pd_kinds, only: wp
   use pd_namelist, only: max_problems
   use pd_namelist_groups, only: namelist_group_t, place_of
@@ -43,10 +43,12 @@ contains
     end do
     do k = 1, size(input%boundaries)
       if (errors%count() >= max_problems) return
+      if (any_damaged(groups, 'body')) exit   ! its name may be the one that is asked for
       call check_edges(input, k, group_named(groups, 'boundary', k, input%path), errors)
     end do
     do k = 1, size(input%pressures)
       if (errors%count() >= max_problems) return
+      if (any_damaged(groups, 'body')) exit
       call check_pressed_edges(input, k, group_named(groups, 'pressure', k, input%path), errors)
     end do
   end subroutine check_shapes

@@ -102,7 +102,7 @@ contains
       allowed='only for bodies on a lattice')
     if (input%run%operators == 'list') call errors%add('stages need the operators of a lattice', &
       where='&run operators', found='''list''', allowed='''auto'', ''lattice''')
-    if (input%integration%method /= 'equilibrium') call errors%add( &
+    if (all(input%integration%method /= ['equilibrium', '           '])) call errors%add( &
       'stages go from equilibrium to equilibrium', &
       where=place_of(group_named(groups, 'stage', 1, input%path)), &
       found='method = '''//input%integration%method//'''', &
@@ -193,7 +193,7 @@ contains
     type(error_list_t),     intent(inout) :: errors
     integer :: k
 
-    if (input%integration%method /= 'equilibrium') call errors%add( &
+    if (all(input%integration%method /= ['equilibrium', '           '])) call errors%add( &
       'a factor of safety is looked for at equilibrium', where=place_of(group), &
       found='method = '''//input%integration%method//'''', &
       allowed='&integration method = ''equilibrium''')

@@ -7,10 +7,11 @@ module pd_material_rows
   use pd_kinds, only: n_block, wp
   use pd_law, only: law_t
   use pd_measure, only: measure_t
+  use pd_stretches, only: stretches_t
   implicit none
   private
 
-  public :: material_t, material_rows_t, run_t, divide_into_runs
+  public :: material_t, material_rows_t, run_t, divide_into_runs, leave_out_gaps
 
   !> One material. Its strength belongs to the points.
   type :: material_t
@@ -31,9 +32,13 @@ module pd_material_rows
     type(material_t), allocatable :: list(:)
     type(run_t),      allocatable :: runs(:)
     integer,          allocatable :: first_run(:)   !! of each block, one past the last (blocks+1)
+    type(run_t),      allocatable :: parts(:)       !! of the runs, where they hold points
+    integer,          allocatable :: first_part(:)  !! of each run, one past the last (runs+1)
+    logical :: has_gaps = .false.                   !! parts are less than the runs
     !> Stiffness of the rows over that of their material (n); not allocated: 1 everywhere.
     real(wp),         allocatable :: stiffness(:)
   contains
+    procedure :: clear_gaps
     procedure :: density_block
     procedure :: is_used
     procedure :: wave_speed
@@ -72,7 +77,54 @@ contains
       materials%first_run(blocks%count + 1) = n + 1
       if (pass == 1) allocate (materials%runs(n))
     end do
+    allocate (materials%parts(n), source=materials%runs)
+    allocate (materials%first_part(n + 1), source=[(i, i=1, n + 1)])
   end subroutine divide_into_runs
+
+  !> Kernels pass over what lies between the stretches of rows that hold points.
+  subroutine leave_out_gaps(stretches, materials)
+    type(stretches_t), intent(in) :: stretches
+    class(material_rows_t), intent(inout) :: materials
+    integer :: k, n, pass, r
+
+    materials%has_gaps = stretches%has_gaps
+    if (.not. stretches%has_gaps) return
+    deallocate (materials%parts)
+    do pass = 1, 2   ! count, then fill
+      n = 0
+      do r = 1, size(materials%runs)
+        materials%first_part(r) = n + 1
+        associate (run => materials%runs(r))
+          do k = stretches%from(run%lo), stretches%to(run%hi)
+            if (stretches%hi(k) < run%lo .or. stretches%lo(k) > run%hi) cycle
+            n = n + 1
+            if (pass == 2) materials%parts(n) = run_t(max(run%lo, stretches%lo(k)), &
+              min(run%hi, stretches%hi(k)), run%material)
+          end do
+        end associate
+      end do
+      materials%first_part(size(materials%runs) + 1) = n + 1
+      if (pass == 1) allocate (materials%parts(n))
+    end do
+  end subroutine leave_out_gaps
+
+  !> Zero in those rows of a block that no part has.
+  pure subroutine clear_gaps(self, block, p)
+    class(material_rows_t), intent(in) :: self
+    integer,  intent(in)    :: block
+    real(wp), intent(inout) :: p(n_block, 4)   !! row 1 is the first row of the block
+    integer :: c, k, next, shift
+
+    shift = 1 - self%runs(self%first_run(block))%lo
+    do c = 1, 4
+      next = 1
+      do k = self%first_part(self%first_run(block)), self%first_part(self%first_run(block + 1)) - 1
+        p(next:self%parts(k)%lo + shift - 1, c) = 0.0_wp
+        next = self%parts(k)%hi + shift + 1
+      end do
+      p(next:, c) = 0.0_wp
+    end do
+  end subroutine clear_gaps
 
   !> Density of the rows of a block.
   pure subroutine density_block(self, block, density)

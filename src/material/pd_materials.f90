@@ -11,13 +11,13 @@ module pd_materials
   use pd_kinds, only: n_block, wp
   use pd_labels, only: label_t
   use pd_law, only: law_points_t
-  use pd_material_rows, only: divide_into_runs, material_rows_t, material_t, run_t
+  use pd_material_rows, only: divide_into_runs, leave_out_gaps, material_rows_t, material_t, run_t
   use pd_measure, only: n_kept, small_strain_block
   use pd_tensors, only: determinant
   implicit none
   private
 
-  public :: material_t, materials_t, run_t, divide_into_runs
+  public :: material_t, materials_t, run_t, divide_into_runs, leave_out_gaps
 
   type, extends(material_rows_t) :: materials_t
   contains
@@ -71,12 +71,14 @@ contains
     integer      :: first, k
 
     first = self%runs(self%first_run(block))%lo
-    do k = self%first_run(block), self%first_run(block + 1) - 1
-      associate (run => self%runs(k), material => self%list(self%runs(k)%material))
+    flow%n = 0
+    if (self%has_gaps) call self%clear_gaps(block, p)
+    do k = self%first_part(self%first_run(block)), self%first_part(self%first_run(block + 1)) - 1
+      associate (run => self%parts(k), material => self%list(self%parts(k)%material))
         call material%measure%strain_block(first, run%lo, run%hi, h, p, kept)
         if (allocated(points%initial_strain)) &
           call add_strain(first, run%lo, run%hi, points%initial_strain, p)
-        if (k == self%first_run(block)) then
+        if (k == self%first_part(self%first_run(block))) then
           call self%law_block(run, first, p, points, flow)
         else
           call self%law_block(run, first, p, points, part)

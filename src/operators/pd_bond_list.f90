@@ -10,8 +10,10 @@ module pd_bond_list
   use pd_families, only: family, horizon_t, influence
   use pd_kinds, only: i8, n_block, wp
   use pd_operators, only: operators_t
+  use pd_room, only: has_room
   use pd_sight, only: sight_t
   use pd_storage, only: listed_storage
+  use pd_stretches, only: new_stretches
   implicit none
   private
 
@@ -60,6 +62,7 @@ contains
     operators%n = n
     operators%storage = listed_storage(n)
     operators%domain = new_domain(1, n)
+    operators%stretches = new_stretches(operators%domain%blocks, spread(.true., 1, n))
     allocate (operators%position(n, 2), source=position)
     call sort_into_cells(position, horizon%delta, cells)
     most = largest_neighbourhood(cells)
@@ -100,7 +103,7 @@ contains
     type(error_list_t), intent(inout) :: errors
     type(sight_t), optional, intent(in) :: sight
     integer, allocatable :: members(:)
-    integer     :: i, j, k, n, n_members, most, status
+    integer     :: i, j, k, n, n_members, most
     integer(i8) :: b, n_bonds
     character(24) :: size_text
     real(wp)    :: xi(2), weight
@@ -108,14 +111,14 @@ contains
     n = operators%n
     most = largest_neighbourhood(cells)
     n_bonds = operators%first(n + 1) - 1
-    allocate (operators%neighbour(n_bonds), operators%wx(n_bonds), operators%wy(n_bonds), &
-      operators%weight(n_bonds), operators%weight_sum(n), stat=status)
-    if (status /= 0) then
+    if (.not. has_room(28.0_wp * real(n_bonds, wp))) then
       write (size_text, '(f0.1,a)') 28.0e-9_wp * real(n_bonds, wp), ' GB'
       call errors%add('the bonds do not fit into memory', found=trim(size_text), &
         allowed='less than this machine has: a smaller horizon or a larger spacing')
       return
     end if
+    allocate (operators%neighbour(n_bonds), operators%wx(n_bonds), operators%wy(n_bonds), &
+      operators%weight(n_bonds), operators%weight_sum(n))
 
     !$omp parallel default(none) &
     !$omp shared(n, most, horizon, cells, position, volume, operators, sight) &

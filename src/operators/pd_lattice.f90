@@ -27,6 +27,7 @@ module pd_lattice
   use pd_radial_sums, only: add_radial_sums, new_radial_sums, radial_sums_t
   use pd_sight, only: sight_t
   use pd_storage, only: lattice_storage, line_start
+  use pd_stretches, only: new_stretches
   implicit none
   private
 
@@ -89,8 +90,8 @@ contains
     operators%weighs = any(abs(operators%share_of) > 0.0_wp .and. &
       abs(operators%share_of - 1.0_wp) > 1.0e-12_wp)
     if (.not. operators%weighs) operators%share_of = anint(operators%share_of)
-    operators%domain = new_domain(line_start(operators%storage%ends(1)), &
-      operators%storage%ends(2))
+    operators%domain = new_domain(line_start(operators%storage%ends(1)), operators%storage%ends(2))
+    operators%stretches = new_stretches(operators%domain%blocks, operators%share_of > 0.0_wp)
     if (present(sight)) call new_blocked_bonds(sight, operators%storage, operators%shift, &
       operators%xi, operators%weight, operators%blocked)
     if (allocated(operators%blocked)) operators%hidden_bonds = operators%blocked%count
@@ -302,12 +303,15 @@ contains
     integer,  intent(in) :: lo, hi
     real(wp), intent(in), contiguous :: x(:, :)   !! x~ (n,2)
     real(wp), intent(inout) :: s(n_block, 2)      !! out; row 1 is row lo
-    integer :: k
+    integer :: c, k, rows(2)
 
     s = 0.0_wp
-    do k = 1, 2
-      call add_radial_sums(self%residual, lo, hi, self%residual_weight, x(:, k), &
-        s(:hi - lo + 1, k))
+    do k = self%stretches%from(lo), self%stretches%to(hi)
+      rows = self%stretches%rows(k, lo, hi)
+      do c = 1, 2
+        call add_radial_sums(self%residual, rows(1), rows(2), self%residual_weight, x(:, c), &
+          s(rows(1) - lo + 1:rows(2) - lo + 1, c))
+      end do
     end do
     if (allocated(self%blocked)) call self%blocked%take_out_of_differences(lo, hi, x, s)
   end subroutine difference_sums_block

@@ -8,7 +8,7 @@ module pd_operator_rows
   private
 
   public :: times_k_inverse, stress_times_k_inverse, subtract_affine_control, mean_displacement
-  public :: own_part_of_force
+  public :: own_part_of_force, weigh_rows
 
 contains
 
@@ -33,17 +33,46 @@ contains
     end do
   end subroutine times_k_inverse
 
-  !> A = P K^-1 of rows lo to hi.
-  pure subroutine stress_times_k_inverse(lo, hi, k, p, a)
-    integer,  intent(in) :: lo, hi
-    real(wp), intent(in),    contiguous :: k(:, :)   !! K^-1 (n,3) xx yy xy [1/m^4]
-    real(wp), intent(in),    contiguous :: p(:, :)   !! P xx xy yx yy [Pa]; row 1 is row lo
-    real(wp), intent(inout), contiguous :: a(:, :)   !! out: A (n,4) xx xy yx yy [N/m^6]
-    integer :: i, b
+  !> u times the share of the points and, where it is given, a factor.
+  subroutine weigh_rows(rows, share, u, weighed, factor)
+    integer,  intent(in) :: rows(2)                      !! first and last
+    real(wp), intent(in), contiguous :: share(:)         !! (n)
+    real(wp), intent(in), contiguous :: u(:, :)          !! (n,2)
+    real(wp), intent(inout), contiguous :: weighed(:, :) !! out: (n,2)
+    real(wp), intent(in), contiguous, optional :: factor(:)   !! (n)
+    integer :: i
 
+    if (present(factor)) then
+      !$omp parallel do simd schedule(static) default(none) private(i) &
+      !$omp shared(rows, share, u, weighed, factor)
+      do i = rows(1), rows(2)
+        weighed(i, 1) = share(i) * factor(i) * u(i, 1)
+        weighed(i, 2) = share(i) * factor(i) * u(i, 2)
+      end do
+      !$omp end parallel do simd
+    else
+      !$omp parallel do simd schedule(static) default(none) private(i) &
+      !$omp shared(rows, share, u, weighed)
+      do i = rows(1), rows(2)
+        weighed(i, 1) = share(i) * u(i, 1)
+        weighed(i, 2) = share(i) * u(i, 2)
+      end do
+      !$omp end parallel do simd
+    end if
+  end subroutine weigh_rows
+
+  !> A = P K^-1 of some rows.
+  pure subroutine stress_times_k_inverse(rows, k, p, a)
+    integer,  intent(in) :: rows(3)                  !! that of row 1 of p; first and last
+    real(wp), intent(in),    contiguous :: k(:, :)   !! K^-1 (n,3) xx yy xy [1/m^4]
+    real(wp), intent(in),    contiguous :: p(:, :)   !! P xx xy yx yy [Pa]
+    real(wp), intent(inout), contiguous :: a(:, :)   !! out: A (n,4) xx xy yx yy [N/m^6]
+    integer :: i, b, shift
+
+    shift = 1 - rows(1)
     !$omp simd simdlen(8) private(b)
-    do i = lo, hi
-      b = i - lo + 1
+    do i = rows(2), rows(3)
+      b = i + shift
       a(i, 1) = p(b, 1) * k(i, 1) + p(b, 2) * k(i, 3)
       a(i, 2) = p(b, 1) * k(i, 3) + p(b, 2) * k(i, 2)
       a(i, 3) = p(b, 3) * k(i, 1) + p(b, 4) * k(i, 3)

@@ -16,9 +16,8 @@
 !>   share()                             the sums can read A
 !>   force_block(lo, hi, u, f)           for every block
 !> Realisations: `pd_bond_list` for any points, `pd_balanced_list` off lattices, `pd_lattice` on
-!> them. Set-up chooses; nothing else knows which. Each provides the sums G, D, Z and S. Where its
-!> weights leave out the volume of the neighbour, fields are first multiplied by its share. Families
-!> hold what a point sees (`pd_sight`).
+!> them; set-up chooses. Each provides the sums G, D, Z and S. Where its weights leave out the
+!> volume of the neighbour, fields are first multiplied by its share. Families: see `pd_sight`.
 !> Source: doc/theory.md, sections 2, 4 and 5.
 module pd_operators
   use pd_blocks, only: blocks_t
@@ -27,9 +26,10 @@ module pd_operators
   use pd_kinds, only: block_sum, i8, n_block, pi, wp
   use pd_mirror, only: mirror_t
   use pd_operator_rows, only: mean_displacement, stress_times_k_inverse, subtract_affine_control, &
-    times_k_inverse
+    times_k_inverse, weigh_rows
   use pd_relaxing, only: relaxing_t, springs_t
   use pd_storage, only: storage_t
+  use pd_stretches, only: stretches_t
   implicit none
   private
 
@@ -41,6 +41,7 @@ module pd_operators
     type(storage_t) :: storage                            !! row of every point
     type(domain_t)  :: domain                             !! blocks of rows
     type(mirror_t)  :: mirror                             !! layers that are images of the body
+    type(stretches_t) :: stretches                        !! rows in blocks that hold points
     real(wp), allocatable :: weight_sum(:)                !! W_i = sum_j omega V_j (n) [m^2]
     real(wp), allocatable :: k_inverse(:, :)              !! K^-1 (n,3) xx yy xy [1/m^4]
     real(wp), allocatable :: control(:)                   !! c (n) [N/m^6]; not allocated: none
@@ -170,27 +171,14 @@ contains
   subroutine weigh_in(self, u)
     class(operators_t), intent(inout) :: self
     real(wp), intent(in), contiguous :: u(:, :)   !! (n,2) [m]
-    integer :: i, first, last
+    integer :: rows(2)
 
-    first = self%domain%known(1)
-    last = self%domain%known(2)
+    rows = self%domain%known
     if (self%weighs) then
       call self%domain%make_room(self%n, 2, self%weighed)
-      !$omp parallel do simd schedule(static) default(none) shared(self, u, first, last) private(i)
-      do i = first, last
-        self%weighed(i, 1) = self%share_of(i) * u(i, 1)
-        self%weighed(i, 2) = self%share_of(i) * u(i, 2)
-      end do
-      !$omp end parallel do simd
+      call weigh_rows(rows, self%share_of, u, self%weighed)
     end if
-    if (allocated(self%pull)) then
-      !$omp parallel do simd schedule(static) default(none) shared(self, u, first, last) private(i)
-      do i = first, last
-        self%pull(i, 1) = self%share_of(i) * self%control(i) * u(i, 1)
-        self%pull(i, 2) = self%share_of(i) * self%control(i) * u(i, 2)
-      end do
-      !$omp end parallel do simd
-    end if
+    if (allocated(self%pull)) call weigh_rows(rows, self%share_of, u, self%pull, self%control)
   end subroutine weigh_in
 
   !> A <- A times the share of the points, for rows lo to hi.
@@ -214,9 +202,14 @@ contains
     integer,  intent(in) :: lo, hi
     real(wp), intent(in),    contiguous :: u(:, :)   !! (n,2) [m]; as taken in
     real(wp), intent(inout), contiguous :: h(:, :)   !! out: (n,4) xx xy yx yy
+    integer :: k, rows(2)
 
-    call self%gradient_sums_block(lo, hi, u, h)
-    call times_k_inverse(lo, hi, self%k_inverse, h)
+    call self%stretches%clear_gaps(lo, hi, h)
+    do k = self%stretches%from(lo), self%stretches%to(hi)
+      rows = self%stretches%rows(k, lo, hi)
+      call self%gradient_sums_block(rows(1), rows(2), u, h)
+      call times_k_inverse(rows(1), rows(2), self%k_inverse, h)
+    end do
   end subroutine gradient_block
 
   !> The relaxing control of a block: what it remembers goes from step n to n+1 as the points flow,
@@ -282,8 +275,12 @@ contains
     integer,  intent(in) :: lo, hi
     real(wp), intent(in), contiguous :: h(:, :)   !! H (n,4) xx xy yx yy
     real(wp), intent(in), contiguous :: p(:, :)   !! P xx xy yx yy [Pa]; row 1 is row lo
+    integer :: k, rows(2)
 
-    call stress_times_k_inverse(lo, hi, self%k_inverse, p, self%force_tensor)
+    do k = self%stretches%from(lo), self%stretches%to(hi)
+      rows = self%stretches%rows(k, lo, hi)
+      call stress_times_k_inverse([lo, rows(1), rows(2)], self%k_inverse, p, self%force_tensor)
+    end do
     if (allocated(self%control) .and. .not. self%sums_whole_control) &
       call subtract_affine_control(lo, hi, self%control, h, self%force_tensor)
     call self%weigh_block(lo, hi, self%force_tensor)
@@ -304,12 +301,17 @@ contains
     real(wp), intent(in),    contiguous :: u(:, :)   !! (n,2) [m]; as taken in
     real(wp), intent(inout), contiguous :: f(:, :)   !! out: (n,2) [N/m^3]
     real(wp) :: sums(n_block, 2)
+    integer  :: k, rows(2)
 
-    call self%divergence_sums_block(lo, hi, self%force_tensor, f)
-    if (allocated(self%control)) call self%control_sums_block(lo, hi, u, f)
-    if (.not. allocated(self%relaxing)) return
-    call self%difference_sums_block(lo, hi, self%relaxing%pull, sums)
-    f(lo:hi, :) = f(lo:hi, :) - sums(:hi - lo + 1, :)
+    call self%stretches%clear_gaps(lo, hi, f)
+    do k = self%stretches%from(lo), self%stretches%to(hi)
+      rows = self%stretches%rows(k, lo, hi)
+      call self%divergence_sums_block(rows(1), rows(2), self%force_tensor, f)
+      if (allocated(self%control)) call self%control_sums_block(rows(1), rows(2), u, f)
+      if (.not. allocated(self%relaxing)) cycle
+      call self%difference_sums_block(rows(1), rows(2), self%relaxing%pull, sums)
+      f(rows(1):rows(2), :) = f(rows(1):rows(2), :) - sums(:rows(2) - rows(1) + 1, :)
+    end do
   end subroutine force_block
 
   !> Stiffness of the control after Silling, c_i = g C_0 / W_i with C_0 = 48 E / (5 pi delta^2).

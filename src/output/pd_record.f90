@@ -37,7 +37,6 @@ module pd_record
   public :: record_failure, record_progress, record_line, observe_state
   public :: record_doubts, record_quality, load_doubts, largest_reaction_before
   public :: record_tries, save_checkpoint, save_last_checkpoint, load_checkpoint
-  public :: same_points, same_history
 
   !> The open outputs of a run.
   type :: record_t
@@ -474,38 +473,5 @@ contains
     ledger%control = checkpoint%ledger_blocks(:, 4)
     call compare_used(checkpoint%input, used_values(input), input_errors)
   end subroutine load_checkpoint
-
-  !> Whether the points of a checkpoint are those of the body, boundaries included (a point cloud
-  !> may have changed).
-  pure logical function same_points(checkpoint, model) result(same)
-    type(checkpoint_t), intent(in) :: checkpoint
-    type(model_t),      intent(in) :: model   !! with its body
-
-    if (model%whole%n > 0) then
-      same = are_those_of(model%whole)
-    else
-      same = are_those_of(model%body)
-    end if
-
-  contains
-
-    pure logical function are_those_of(body)
-      type(body_t), intent(in) :: body
-
-      are_those_of = size(checkpoint%volume) == body%n
-      if (are_those_of) are_those_of = all(abs(checkpoint%position - body%position) <= 0.0_wp) &
-        .and. all(abs(checkpoint%volume - body%volume) <= 0.0_wp) &
-        .and. all(checkpoint%boundary == body%boundary)
-    end function are_those_of
-
-  end function same_points
-
-  !> Whether the points of a state from a checkpoint remember as much as the laws of the model.
-  pure logical function same_history(state, model) result(same)
-    type(state_t), intent(in) :: state
-    type(model_t), intent(in) :: model
-
-    same = size(state%history, 2) == size(model%materials%remembered())
-  end function same_history
 
 end module pd_record

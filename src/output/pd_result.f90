@@ -17,6 +17,7 @@ module pd_result
   use pd_labels, only: label_t
   use pd_model, only: model_t
   use pd_observe, only: column_t, moment_t
+  use pd_result_tries, only: put_tries
   use pd_rows, only: check_rows, compare_rows, copy_rows, put_rows, reserve_rows, resize_rows, &
     rows_in
   use pd_run_description, only: run_description_t, schema, schema_version, write_description, &
@@ -315,37 +316,16 @@ contains
     call close_file(file, errors)
   end subroutine write_failed_frame
 
-  !> Write the tries of a search for the factor of safety; it lies between the two attributes.
+  !> Write the tries of a search for the factor of safety.
   subroutine write_tries(result, tries, errors)
     type(result_t),     intent(inout) :: result
     type(tries_t),      intent(in)    :: tries
     type(error_list_t), intent(inout) :: errors
-    character(*), parameter :: group = '/strength_reduction'
     type(hdf5_file_t) :: file
 
     call open_own(result, file, errors)
-    call create_group(file, group, errors)
-    call write_attribute(file, group, 'borne', tries%least(), errors)
-    call write_attribute(file, group, 'not_borne', tries%most(), errors)
-    call write_try('factor', '1', 'number by which the strength was divided', tries%factor)
-    call write_try('held', '1', 'whether an equilibrium was found: 1, or 0', &
-      merge(1.0_wp, 0.0_wp, tries%held))
-    call write_try('displacement', 'm', 'largest displacement from the start of the try', &
-      tries%displacement)
-    call write_try('unbalanced_force', '1', 'unbalanced force at the end of the try, over '// &
-      'reactions and loads', tries%unbalanced)
+    call put_tries(file, tries, errors)
     call close_file(file, errors)
-
-  contains
-
-    subroutine write_try(name, unit, description, values)
-      character(*), intent(in) :: name, unit, description
-      real(wp),     intent(in) :: values(:)
-
-      call write_dataset(file, group//'/'//name, values, errors)
-      call write_label(file, group//'/'//name, label_t(name, unit, description), errors)
-    end subroutine write_try
-
   end subroutine write_tries
 
   !> Write the rows that wait, and mark the result as complete: the run has come to its end. Only

@@ -56,7 +56,7 @@ contains
     xdmf%path = path
     xdmf%data_file = data_path(index(data_path, '/', back=.true.) + 1:)
     xdmf%n = n
-    xdmf%fields = fields
+    allocate (xdmf%fields, source=fields)
     xdmf%yields = yields
     allocate (xdmf%times(room))
   end function new_xdmf

@@ -14,7 +14,7 @@ module pd_setup
   use pd_setup_initial_stress, only: set_up_initial_stress
   use pd_setup_loads, only: set_up_loads, set_up_platens, set_up_supports
   use pd_setup_materials, only: set_up_materials, set_up_points, set_up_relaxing_control
-  use pd_setup_mirror, only: give_images_their_volume, set_up_mirror
+  use pd_setup_mirror, only: set_up_mirror
   use pd_setup_probes, only: set_up_probes
   use pd_setup_sight, only: look_around
   use pd_shape_tensor, only: invert_shape_tensors
@@ -31,10 +31,10 @@ contains
   !> Operators, materials, supports, loads, damping.
   !>
   !> Errors: a cut that crosses no bond, points that coincide, families that are too small, no free
-  !> point, a smooth boundary on a body thinner than its layer, a pressure that acts on no point, a
-  !> platen under a traction with points of different density, a relaxing control of families whose
-  !> bonds are all equally long, a gradient that leaves nothing of a material, a probe far from the
-  !> body, an initial stress beyond the yield stress.
+  !> point, a pressure that acts on no point, a platen under a traction with points of different
+  !> density, a relaxing control of families whose bonds are all equally long, a gradient that
+  !> leaves nothing of a material, a probe far from the body, an initial stress beyond the yield
+  !> stress.
   subroutine set_up_model(input, model, errors, stage)
     type(input_t),      intent(in)    :: input
     type(model_t),      intent(inout) :: model    !! in: with its body
@@ -54,8 +54,6 @@ contains
     call look_around(input, horizon, model%body, sight, errors)
     if (errors%count() > 0) return
     rows = ceiling(model%delta / model%spacing - 1.0e-6_wp)
-    call give_images_their_volume(input, rows, model%body, errors)
-    if (errors%count() > 0) return
     call choose_operators(horizon, input%run%operators, sight, model, errors)
     if (errors%count() > 0) return
     model%blocks = model%operators%domain%blocks

@@ -9,6 +9,7 @@ module pd_setup_body
   use pd_input_types, only: body_input_t, input_t
   use pd_kinds, only: is_set, wp
   use pd_random_field, only: longest_way
+  use pd_setup_mirror, only: give_images_their_volume
   use pd_text, only: coordinate_text, number_text, short_number
   implicit none
   private
@@ -20,7 +21,7 @@ contains
   !> Points, volumes and boundary sets.
   !>
   !> Errors: a cloud file that is wrong; a body or a boundary without points, a hole without
-  !> effect; a weak patch that holds no point.
+  !> effect; a smooth boundary before a body thinner than its layer; a weak patch without a point.
   subroutine set_up_body(input, body, doubts, input_errors, errors)
     type(input_t),      intent(in)    :: input
     type(body_t),       intent(out)   :: body
@@ -78,7 +79,8 @@ contains
     if (input_errors%count() > 0) return
     do k = 1, size(names)
       if (.not. any(body%boundary == k)) &
-        call errors%add('a boundary holds no point', '&boundary name = '//trim(names(k)))
+        call errors%add('a boundary holds no point', '&boundary name = '//trim(names(k)), &
+                        'no such name in column 4 of '//trim(input%bodies(1)%file))
     end do
   end subroutine cloud_body
 
@@ -171,6 +173,7 @@ contains
       layers(k)%mirror = is_bearing(input%boundaries(k))
     end do
     call region_body(shapes, origin, lattice, layers, body, errors)
+    if (errors%count() == 0) call give_images_their_volume(input, lattice%rows, body, errors)
     if (adjusted .and. errors%count() == 0) then
       associate (dx => lattice%spacing)
         call doubts%add('body_adjusted', 0.0_wp, 'the body is adjusted to the spacing: x from '// &

@@ -14,7 +14,7 @@ module pd_setup_materials
   use pd_kinds, only: is_set, wp
   use pd_law, only: law_t
   use pd_logarithmic, only: logarithmic_t
-  use pd_materials, only: divide_into_runs, material_t
+  use pd_materials, only: divide_into_runs, leave_out_gaps, material_t
   use pd_measure, only: measure_t
   use pd_model, only: model_t, top_of
   use pd_operators, only: control_stiffness
@@ -68,6 +68,7 @@ contains
     law_of = material_of
     call set_up_bearings(input, law_of, model)
     call divide_into_runs(model%blocks, model%operators%storage%spread(law_of), model%materials)
+    call leave_out_gaps(model%operators%stretches, model%materials)
     call set_up_stiffness(input, material_of, model)
     call set_up_strength(input, material_of, model%body%position, top_of(model), strength)
     model%strength = model%operators%storage%spread(strength)

@@ -6,7 +6,7 @@ call come from one machine in one go; ratios mean more than times, which are noi
 
     bench.py [--quick] [--publish]
     bench.py --alignment             only what arrays at whole lines of the cache gain
-    bench.py --slot                  only what a body with a slot costs
+    bench.py --slot                  only what a body with a slot costs, and a polygon
 """
 
 from __future__ import annotations
@@ -45,6 +45,7 @@ PAGE = ROOT / "doc" / "performance.md"
 
 ALIGNMENT = "Arrays at whole lines of the cache"
 SLOT = "A slot over half of the height of a specimen, m = 4"
+POLYGON = "Polygons within a box of 201 x 201 places, m = 3"
 IN_CONTROL = {"method = 'none'": "method = 'silling', factor = 0.0125"}
 IN_RELAXING = {"method = 'none'": "method = 'relaxing'"}
 
@@ -341,6 +342,32 @@ def table_of_slots(data: dict[str, object], few: int, turns: int) -> str:
     return table(["case", "bonds missing %", "ns/point-step", "with the slot", "ratio"], rows)
 
 
+def table_of_polygons(data: dict[str, object], few: int, turns: int) -> str:
+    """Polygons, whose box has places without a point, against the rectangle: runs by turns."""
+    shapes = {
+        "trapezium": "0.0, 0.0, 1.0, 0.0, 0.8, 1.0, 0.2, 1.0",
+        "slope": "0.0, 0.0, 1.0, 0.0, 1.0, 0.4, 0.7, 0.4, 0.3, 1.0, 0.0, 1.0",
+        "strip": "0.0, 0.0, 0.3, 0.0, 1.0, 1.0, 0.7, 1.0",
+    }
+    rows = []
+    for name, control in {"none": PLAIN, "relaxing": "&stabilisation /\n"}.items():
+        case = partial(lattice_case, 201, 201, 3, 160 // few, more=control)
+        whole, *others = best(turns, case, *(partial(case, vertices=v) for v in shapes.values()))
+        for shape, found in zip(shapes, others):
+            label = f"{shape}, control {name}"
+            data[f"polygon {label}"] = found
+            rows.append(
+                [
+                    label,
+                    f"{found['points'] / whole['points']:.2f}",
+                    f"{step_ns(whole):.1f}",
+                    f"{step_ns(found):.1f}",
+                    f"{step_ns(found) / step_ns(whole):.2f}",
+                ]
+            )
+    return table(["case", "part of the box", "ns/point-step, rectangle", "polygon", "ratio"], rows)
+
+
 def measure(quick: bool) -> tuple[dict[str, object], list[tuple[str, str]]]:
     """All measurements, and the tables that show them."""
     limits = machine()
@@ -359,6 +386,7 @@ def measure(quick: bool) -> tuple[dict[str, object], list[tuple[str, str]]]:
         ("Cost against n, m = 4", table_of_n(data, few)),
         (ALIGNMENT, table_of_alignment(data, few)),
         (SLOT, table_of_slots(data, few, 2 * turns)),
+        (POLYGON, table_of_polygons(data, few, 2 * turns)),
     ]
     return data, tables
 
@@ -375,7 +403,9 @@ def main() -> int:
         print(f"**{ALIGNMENT}**\n\n{table_of_alignment({}, 4 if arguments.quick else 1)}")
         return 0
     if arguments.slot:
-        print(f"**{SLOT}**\n\n{table_of_slots({}, 4 if arguments.quick else 1, 15)}")
+        few = 4 if arguments.quick else 1
+        print(f"**{SLOT}**\n\n{table_of_slots({}, few, 15)}\n")
+        print(f"**{POLYGON}**\n\n{table_of_polygons({}, few, 15)}")
         return 0
     data, tables = measure(arguments.quick)
     (ROOT / "results" / "bench.json").write_text(json.dumps(data, indent=1) + "\n")

@@ -82,9 +82,11 @@ def lattice_case(
     operators: str = "lattice",
     more: str = "",
     program: Path = PROGRAM,
+    vertices: str = "",
 ) -> dict[str, float]:
-    """A specimen of columns x rows points, loaded for some steps."""
+    """A specimen of columns x rows points, or a polygon within it, loaded for some steps."""
     name = f"{operators}_{columns}x{rows}_m{m}_t{threads}" + ("_more" if more else "")
+    name += "_polygon" if vertices else ""
     folder = RESULTS / name
     folder.mkdir(parents=True, exist_ok=True)
     dx = 1.0 / (columns - 1)
@@ -101,6 +103,10 @@ def lattice_case(
         dt=repr(dt),
         rows=max(1, steps // 10),
     )
+    if vertices:
+        text = re.sub(
+            r"&body [^/]*/", f"&body shape = 'polygon', vertices = {vertices} /", text, count=1
+        )
     path = folder / f"{name}.nml"
     path.write_text(text + (more or PLAIN))
     return run(path, folder, name, threads, program)

@@ -276,13 +276,20 @@ def test_doubts_at_the_start_stand_in_log_and_result(run_case, tmp_path):
     assert found["few_points"][1] == 30
 
 
-def test_doubts_go_through_a_restart(program, run_case, tmp_path):
-    text = changed(IN_THE_RUN["control_work"][0], final_strain="0.2")
+def test_doubts_go_through_a_restart(program, tmp_path):
+    text = changed(IN_THE_RUN["control_work"][0], final_strain="0.4")
     text = text.replace("frame_count = 1", "frame_count = 20")
-    assert stop(begin(program, tmp_path, text), signal.SIGTERM, tmp_path, 10) == 143
+
+    def stopped(*options):
+        path = tmp_path / "out" / "case_history.csv"
+        rows = path.read_bytes().count(b"\n") if path.exists() else 0
+        process = begin(program, tmp_path, text, *options)
+        assert stop(process, signal.SIGTERM, tmp_path, rows + 10) == 143
+
+    stopped()
     first = doubts_of(tmp_path / "out" / "case.h5")
     assert "control_work" in first
-    assert stop(begin(program, tmp_path, text, "--restart"), signal.SIGTERM, tmp_path, 20) == 143
+    stopped("--restart")
     second = doubts_of(tmp_path / "out" / "case.h5")
     assert second["control_work"] == first["control_work"]
     log = (tmp_path / "out" / "case.log").read_text()
@@ -290,7 +297,7 @@ def test_doubts_go_through_a_restart(program, run_case, tmp_path):
     # the checkpoint before the newest, where that is damaged
     (tmp_path / "out" / "case_checkpoint.h5").write_bytes(b"")
     assert "older_checkpoint" not in second
-    assert stop(begin(program, tmp_path, text, "--restart"), signal.SIGTERM, tmp_path, 30) == 143
+    stopped("--restart")
     assert "older_checkpoint" in doubts_of(tmp_path / "out" / "case.h5")
 
 

@@ -139,7 +139,7 @@ def test_a_wrong_line_of_a_point_cloud_is_named(run_case, tmp_path):
     (tmp_path / "cloud.txt").write_text("\n".join([*GRID, "1 2", ""]))
     done = run_case(CLOUD, tmp_path)
     assert done.returncode == 2
-    assert "cloud.txt, line 26: a point cannot be read; found: 1 2" in done.stderr
+    assert "cloud.txt, line 26: a point has no volume in column 3; found: 1 2" in done.stderr
 
 
 # ------------------------------------------------------------------------------ 4

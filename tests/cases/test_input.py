@@ -39,6 +39,12 @@ MISTAKES = {
     "text without quotes": ("'j2'", "j2", "model: text must stand in quotes; found: j2"),
     "too many values": ("-0.01", "-0.01, 1.0", "velocity: too many values; found: 3 values"),
     "too few values": ("0.0, -0.01", "-0.01", "velocity: too few values; found: 1 value"),
+    "decimal comma": ("= 0.1,", "= 0,1,", "the decimal sign is a point; found: 0,1; allowed: > 0"),
+    "decimal comma in a list": ("= 0.0005,", "= 0,0005,", "the decimal sign is a point"),
+    "decimal commas in a pair": ("0.0, -0.01", "0,5 -0,01", "the decimal sign is a point"),
+    "long minus sign": ("-0.01", "\u22120.01", "a minus sign that is not that of the keyboard"),
+    "curly quotes": ("'j2'", "\u2019j2\u2019", "a quotation mark that is not that of the keyboard"),
+    "velocity that is no number": ("-0.01", "fast", "velocity: text where a number is due"),
     "missing slash": ("0.3 /\n&body", "0.3\n&body", "group &discretisation is not ended by /"),
     "last slash missing": ("0.001 /\n&output", "0.001 &output", "group &integration is not ended"),
     "missing quote": ("'case'", "'case", "a text without its closing quote"),
@@ -429,17 +435,3 @@ def test_a_run_with_settings_stores_them_beside_the_file(run_case, tmp_path):
         values = [line.strip() for line in results["input/values"].asstr()[()]]
         assert "material.density = 1800.0" in values
         assert b"--set material.density=1800" in bytes(results.attrs["command_line"])
-
-
-def test_a_restart_asks_for_the_same_settings(run_case, tmp_path):
-    case = VALID.replace("&output", "&output checkpoint_every = 1.0e-6,")
-    settings = ["--set", "material.density=1800"]
-    done = run_case(case, tmp_path, *settings, "--quiet")
-    assert done.returncode == 0, done.stderr
-    done = run_case(case, tmp_path, "--restart", "--quiet")
-    assert done.returncode == 2
-    assert "material.density: differs from the run that is to go on" in done.stderr
-    assert "found: 2000.0; allowed: 1800.0" in done.stderr
-    later = [*settings, "--set", "integration.final_strain=0.0011"]
-    done = run_case(case, tmp_path, *later, "--restart", "--quiet")
-    assert done.returncode == 0, done.stderr

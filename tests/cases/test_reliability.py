@@ -359,3 +359,84 @@ def test_a_signal_that_the_parent_ignores_stays_ignored(program, tmp_path, strai
         signal.signal(signal.SIGHUP, before)
     assert stop(process, signal.SIGHUP, tmp_path, 50) == 0
     assert (tmp_path / "out" / "case_history.csv").read_bytes() == straight
+
+
+# ------------------------------------------------------------------------------ memory
+
+
+MEGABYTE = 2**20
+
+
+@pytest.mark.parametrize("operators", ["lattice", "list"])
+def test_a_body_without_memory_is_status_3_with_the_figure(program, tmp_path, operators):
+    text = changed(SPECIMEN, spacing="0.0025", horizon="0.005", final_strain=None)
+    text = text.replace("&integration", "&integration end_time = 1.0e-9,")
+    text = text.replace("&run", f"&run operators = '{operators}',")
+    text = text.replace("frame_strains = 0.004, 0.01, ", "frame_count = 1, ")
+    (tmp_path / "run.nml").write_text(text)
+    status = 3
+    for megabytes in range(60, 400, 10):
+        limit = megabytes * MEGABYTE
+        done = subprocess.run(
+            [program, "--threads", "1", "run.nml"], cwd=tmp_path, check=False, timeout=60,
+            capture_output=True, text=True,
+            preexec_fn=lambda limit=limit: resource.setrlimit(resource.RLIMIT_AS, (limit, limit)),
+        )  # fmt: skip
+        if done.returncode == 127 or "shared libraries" in done.stderr:
+            continue  # not even the libraries have room
+        status = done.returncode
+        if status == 0:
+            break
+        assert status == 3, (megabytes, done.stderr)
+        assert " GB" in done.stderr or " MB more were asked for" in done.stderr
+        assert "race" not in done.stderr
+        assert list(contents(tmp_path)) == ["run.nml"]
+    assert status == 0
+
+
+def test_a_body_too_large_for_the_machine_is_refused_at_once(run_case, tmp_path):
+    text = changed(SPECIMEN, spacing="1.0e-4", horizon="3.0e-4", frame_strains=None)
+    text = changed(text, x_max="0.9999", y_max="0.9999")
+    memory = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    if memory > 40e9:
+        pytest.skip("this machine has room for it")
+    for options in ([], ["--check"]):
+        done = run_case(text, tmp_path, *options)
+        assert done.returncode == 3
+        assert "too large for the memory of this machine" in done.stderr
+        assert list(contents(tmp_path)) == ["run.nml"]
+
+
+def test_a_check_of_a_large_body_speaks_first(program, tmp_path):
+    text = changed(SPECIMEN, spacing="2.0e-4", horizon="6.0e-4", frame_strains=None)
+    (tmp_path / "run.nml").write_text(text)
+    process = subprocess.Popen(
+        [program, "--check", "run.nml"], cwd=tmp_path, stdout=subprocess.PIPE, text=True
+    )
+    with process.stdout:
+        assert "points, " in process.stdout.readline()
+        assert process.poll() is None
+    process.kill()
+    process.wait()
+
+
+# ------------------------------------------------------------------------------ threads
+
+
+def test_a_small_body_takes_one_thread_unless_the_user_says_more(program, tmp_path):
+    text = changed(SPECIMEN, final_strain=None).replace("frame_strains = 0.004, 0.01, ", "")
+    (tmp_path / "run.nml").write_text(
+        text.replace("&integration", "&integration end_time = 0.01, time_step_rule = 'courant',")
+    )
+    free = {name: value for name, value in os.environ.items() if name != "OMP_NUM_THREADS"}
+    two = {**free, "OMP_NUM_THREADS": "2"}
+    for options, environment, threads in (
+        ([], free, 1),
+        ([], two, 2),
+        (["--threads", "2"], free, 2),
+    ):
+        subprocess.run(
+            [program, "--quiet", "--force", *options, "run.nml"], cwd=tmp_path, env=environment,
+            check=True,
+        )  # fmt: skip
+        assert attributes(tmp_path / "out" / "case.h5")["threads"] == threads

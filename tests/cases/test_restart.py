@@ -17,6 +17,7 @@ from case_files import (
     same_points_and_frames,
     stop,
 )
+from test_input import VALID
 
 # Long enough to be hit in the middle by a signal, with many rows and frames.
 LONG = changed(SPECIMEN, final_strain="0.04", history_count="400", spacing="0.05", horizon="0.16")
@@ -316,3 +317,17 @@ def test_a_finished_run_without_a_state_says_so(run_case, tmp_path):
     done = run_case(later, tmp_path, "--restart")
     assert done.returncode == 5
     assert "the run is finished, and no state was kept" in done.stderr
+
+
+def test_a_restart_asks_for_the_same_settings(run_case, tmp_path):
+    case = VALID.replace("&output", "&output checkpoint_every = 1.0e-6,")
+    settings = ["--set", "material.density=1800"]
+    done = run_case(case, tmp_path, *settings, "--quiet")
+    assert done.returncode == 0, done.stderr
+    done = run_case(case, tmp_path, "--restart", "--quiet")
+    assert done.returncode == 2
+    assert "material.density: differs from the run that is to go on" in done.stderr
+    assert "found: 2000.0; allowed: 1800.0" in done.stderr
+    later = [*settings, "--set", "integration.final_strain=0.0011"]
+    done = run_case(case, tmp_path, *later, "--restart", "--quiet")
+    assert done.returncode == 0, done.stderr

@@ -216,7 +216,8 @@ def main() -> int:
             except (PostError, RuntimeError, KeyError) as problem:
                 case = CASES[name]
                 what = ", ".join(filter(None, (case.title, variant.title, case.grids[grid][0])))
-                failures.append(f"{what}: {str(problem).replace(f'{ROOT}/', '').strip()}")
+                words = str(problem).replace(f"{ROOT}/", "").strip().splitlines()
+                failures.append(f"{what}: {words[0]}")
     compare_with_finest(rows)
     lines = table(rows)
     widths = [max(len(line[k]) for line in lines) for k in range(len(lines[0]))]

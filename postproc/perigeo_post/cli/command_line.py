@@ -59,7 +59,8 @@ COMMANDS: dict[str, tuple[_Setup, _Action, str, str]] = {
         perigeo-post curves run.h5 -o curve.pdf --mark 1% 1.3% 1.6%
         perigeo-post curves a.h5 b.h5 --labels "m = 3" "m = 4" --csv curves.csv
         perigeo-post curves run.h5 --energies --against time
-        perigeo-post curves run.h5 --column max_plastic_strain""",
+        perigeo-post curves run.h5 --x footing_displacement_y --y footing_force_y
+        perigeo-post curves run.h5 --x time --y top_force_x top_force_y""",
     ),
     "contours": (
         contours.add_options, contours.carry_out,

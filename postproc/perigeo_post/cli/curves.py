@@ -6,7 +6,7 @@ import argparse
 from typing import Any
 
 from ..measure import export, measures
-from ..measure.curves import Curve, curve_numbers, energy_curves, history_curve, stress_strain
+from ..measure.curves import Curve, column_curves, curve_numbers, energy_curves, stress_strain
 from ..read.errors import RequestError
 from ..read.run import Run
 from .options import (
@@ -28,11 +28,17 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     add_labels(parser)
     add_signs(parser)
     what = parser.add_mutually_exclusive_group()
-    what.add_argument("--column", metavar="NAME", help="a history column instead of the stress")
+    what.add_argument(
+        "--y", metavar="NAME", nargs="+", default=[],
+        help="columns of the history instead of the stress, of one unit; 'perigeo-post info' lists "
+        "them",
+    )  # fmt: skip
+    what.add_argument("--column", metavar="NAME", help="the same, one column")
     what.add_argument("--energies", action="store_true", help="all energies of one run")
     parser.add_argument(
-        "--against", metavar="NAME", help="column on the horizontal axis (default: strain or time)"
-    )
+        "--x", "--against", metavar="NAME", dest="x",
+        help="column on the horizontal axis (default: strain or time)",
+    )  # fmt: skip
     parser.add_argument(
         "--platen", choices=["first", "second"], default="first",
         help="platen whose reaction is shown; first: bottom or left (default)",
@@ -44,16 +50,17 @@ def add_options(parser: argparse.ArgumentParser) -> None:
 def carry_out(args: Arguments) -> None:
     runs = [Run(path) for path in args.files]
     names = measures.labels_for(runs, args.labels)
-    plain = not args.energies and not args.column
+    columns = [args.column] if args.column else args.y
+    plain = not args.energies and not columns
     curves: list[Curve] = []
     if args.energies:
         if len(runs) > 1:
             raise RequestError("--energies shows one run; name one file")
-        curves = energy_curves(runs[0], args.against)
-    elif args.column:
-        curves = [history_curve(r, args.column, args.against, n) for r, n in zip(runs, names)]
-    elif args.against:
-        raise RequestError("--against goes with --column or --energies")
+        curves = energy_curves(runs[0], args.x)
+    elif columns:
+        curves = column_curves(runs, columns, args.x, names)
+    elif args.x:
+        raise RequestError("--x goes with --y or --energies")
     else:
         curves = [
             stress_strain(r, args.tension_positive, args.platen, n) for r, n in zip(runs, names)
@@ -84,5 +91,5 @@ def carry_out(args: Arguments) -> None:
         label = "Energy per unit thickness" if args.energies else None
         return figures.curve_figure(curves, label)
 
-    kind = "energies" if args.energies else args.column or "curves"
+    kind = "energies" if args.energies else columns[0] if columns else "curves"
     draw_figure(args, args.files[0], kind, draw)

@@ -106,7 +106,7 @@ def add_labels(parser: argparse.ArgumentParser) -> None:
 
 def check_outputs(args: Arguments) -> None:
     """Refuse outputs that would destroy something, before anything is computed."""
-    if args.command == "study":
+    if args.command in ("study", "export"):
         return  # its output is a folder of its own
     inputs = [*getattr(args, "files", []), *([args.file] if hasattr(args, "file") else [])]
     kinds = {"output": PAGE if args.command == "report" else FIGURE, "csv": TABLE, "table": TABLE}

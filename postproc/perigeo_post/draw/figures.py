@@ -47,6 +47,12 @@ def _words(name: str) -> str:
     return _WORDS.get(name, words[:1].upper() + words[1:])
 
 
+def _shared(curves: Sequence[Curve]) -> str:
+    """The words that the names of all columns share, else "Value"."""
+    names = [curve.y_name.split("_") for curve in curves]
+    return _words("_".join(w for w in names[0] if all(w in name for name in names)) or "value")
+
+
 def draw_curves(
     ax: Axes,
     curves: Sequence[Curve],
@@ -60,9 +66,11 @@ def draw_curves(
     sizes = [float(np.nanmax(np.abs(c.y))) for c in curves if np.isfinite(c.y).any()]
     factor, unit = prefix_for(max(sizes, default=0.0), first.y_unit)
     percent = first.x_name == "strain"
+    wide = [float(np.nanmax(np.abs(c.x))) for c in curves if np.isfinite(c.x).any()]
+    x_factor, x_unit = (100.0, "%") if percent else prefix_for(max(wide, default=0.0), first.x_unit)
     for k, curve in enumerate(curves):
         ax.plot(
-            curve.x * (100.0 if percent else 1.0), curve.y * factor, label=readable(curve.label),
+            curve.x * x_factor, curve.y * factor, label=readable(curve.label),
             color=COLOURS[k % len(COLOURS)], linestyle=DASHES[k % len(DASHES)],
         )  # fmt: skip
     signed = first.y_name == "axial_stress"
@@ -70,10 +78,11 @@ def draw_curves(
     note = f", {sense} positive" if signed else ""
     strain_note = note if signed else ", compression positive"
     ax.set_xlabel(
-        with_unit(_words(first.x_name) + (strain_note if percent else ""),
-                  "%" if percent else first.x_unit)
+        with_unit(_words(first.x_name) + (strain_note if percent else ""), x_unit)
     )  # fmt: skip
-    name = with_unit((y_label or _words(first.y_name)) + note, unit)
+    several = len({c.y_name for c in curves}) > 1
+    name = with_unit((y_label or (_shared(curves) if several else _words(first.y_name))) + note,
+                     unit)  # fmt: skip
     ax.set_ylabel("\n".join(wrapped(name, AXIS_WORDS, 8.0)))
     ax.grid(True, linewidth=0.3, color="0.85")
     ax.set_axisbelow(True)
@@ -195,7 +204,7 @@ def band_words(measure: BandMeasure) -> str:
         f"Prevailing band, {strong.angle:.1f}° ± {strong.angle_uncertainty:.1f}° to the loading "
         f"axis\nweaker over stronger band {measure.bands.ratio:.2f}\n"
         f"width at {100.0 * width.level:g} % of the peak of {width.peak:.3g}:\n"
-        f"between points {sign}{between:.4g} {unit} ± {factor * width.uncertainty:.2g} {unit}, "
+        f"between points {sign}{between:.4g} {unit} ± {factor * width.uncertainty:.2g} {unit},\n"
         f"fitted along the band {fitted:.4g} {unit}\n"
         f"line from {ends[0]} {unit} to {ends[1]} {unit}"
     )

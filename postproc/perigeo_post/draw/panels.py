@@ -157,7 +157,7 @@ def _add_bar(figure: Figure, layout: Layout, drawn: Any, name: str, scale: Scale
 
 def _bar_numbers(scale: Scale, length: float, upright: bool) -> tuple[list[float], list[str]]:
     """Places and numbers of a colour bar of some length [mm]."""
-    return axis_ticks(scale.low, scale.high, 0.5 * length, (1.0, ""), BAR_SIZE, upright)
+    return axis_ticks(scale.low, scale.high, 0.6 * length, (1.0, ""), BAR_SIZE, upright, 8)
 
 
 def contour_figure(

@@ -74,12 +74,21 @@ def unit_for(length: float) -> Unit:
 
 
 def axis_ticks(
-    low: float, high: float, length: float, unit: Unit, size: float, upright: bool = True
+    low: float,
+    high: float,
+    length: float,
+    unit: Unit,
+    size: float,
+    upright: bool = True,
+    most: int = 6,
 ) -> tuple[list[float], list[str]]:
-    """Places and numbers that fit an axis from low to high [m] of some length [mm]."""
+    """Places and numbers that fit an axis from low to high [m] of some length [mm].
+
+    `most`: steps between them.
+    """
     factor = unit[0]
     start, end = factor * low, factor * high
-    for count in range(5 if upright else 7, 0, -1):
+    for count in range(most, 0, -1):
         ticks = MaxNLocator(count, steps=[1, 2, 2.5, 5, 10]).tick_values(start, end)
         slack = 1e-9 * (end - start)
         inside = [float(t) + 0.0 for t in ticks if start - slack <= t <= end + slack]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -79,7 +80,10 @@ def axial_stress(run: Run, platen: str = "first") -> FloatArray:
     if platen not in ("first", "second"):
         raise RequestError(f"the platen must be first or second, not {platen!r}")
     if run.platens is None or run.strain_axis is None:
-        raise RequestError(f"{run.path} has no platens, so there is no axial stress")
+        raise RequestError(
+            f"{run.path} has no platens, so there is no axial stress; columns of the history are "
+            "drawn with --y, 'perigeo-post info' lists them"
+        )
     first = platen == "first"
     name = run.platens[0 if first else 1]
     force = run.history()[f"{name}_force_{run.strain_axis}"]
@@ -122,6 +126,28 @@ def history_curve(
         column,
         history.unit(column),
     )
+
+
+def column_curves(
+    runs: Sequence[Run],
+    columns: Sequence[str],
+    against: str | None = None,
+    labels: Sequence[str] | None = None,
+) -> list[Curve]:
+    """Columns of one unit of the histories of some runs, against another column."""
+    names = labels or [label_of_run(run) for run in runs]
+    found = []
+    for run, name in zip(runs, names):
+        for column in columns:
+            words = column.replace("_", " ")
+            label = name if len(columns) == 1 else words if len(runs) == 1 else f"{name}, {words}"
+            found.append(history_curve(run, column, against, label))
+    units = dict.fromkeys(f"{c.y_name} [{c.y_unit}]" for c in found)
+    if len({c.y_unit for c in found}) > 1:
+        raise RequestError(f"columns of different units in one figure: {', '.join(units)}")
+    if len({c.x_name for c in found}) > 1:
+        raise RequestError("some runs have a strain and some have none: say --x time")
+    return found
 
 
 def energy_curves(run: Run, against: str | None = None) -> list[Curve]:

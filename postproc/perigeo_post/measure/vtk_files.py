@@ -14,6 +14,7 @@ import numpy.typing as npt
 from ..read.errors import OutputError
 from ..read.fields import Field, unknown
 from ..read.file import dataset
+from ..read.outputs import FIELDS, check_output
 from ..read.run import Frame, Run
 
 _VERTEX = 1  # VTK's number of a cell that is one point
@@ -147,6 +148,7 @@ def _array(name: str, values: npt.NDArray[np.generic], components: Sequence[str]
 
 
 def _write(path: Path, text: str) -> None:
+    check_output(path, FIELDS)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text, encoding="utf-8")

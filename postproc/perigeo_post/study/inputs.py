@@ -18,6 +18,7 @@ from typing import Any
 from pydantic import TypeAdapter, ValidationError
 
 from ..read.errors import RequestError
+from ..read.file import decoded
 from .jobs import write_whole
 from .program import NAME, Program, ending
 
@@ -207,4 +208,4 @@ class Inputs:
             lines = [re.sub(rf"^{NAME}: (?:error: )?", "", one) for one in text.splitlines()]
             lines = [one.replace(f"{base}, ", "").replace(f"{base}: ", "") for one in lines if one]
             raise InputError(lines or [ending(done.returncode)])
-        return done.stdout.decode("utf-8")
+        return decoded(done.stdout)

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ..read.errors import PostError
+from ..read.file import decoded
 from .expressions import nearest
 
 if sys.version_info >= (3, 11):
@@ -94,16 +95,40 @@ def _short(value: object) -> str:
 def read_toml(path: Path) -> tuple[dict[str, Any], Problems]:
     """The contents of a TOML file, and an empty list of mistakes that knows its lines."""
     try:
-        text = path.read_text(encoding="utf-8")
-    except UnicodeDecodeError:
-        raise StudyError([f"{path}: the study file is not a text in UTF-8"]) from None
+        text = plain_text(path.read_bytes())
     except OSError as error:
         raise StudyError([f"{path}: the study file cannot be read: {error.strerror}"]) from error
     try:
         data = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise StudyError([f"{path}: this is not TOML: {error}"]) from None
+        raise StudyError([f"{path}: this is not TOML: {error}{_meant(text, str(error))}"]) from None
     return data, Problems(str(path), key_lines(text))
+
+
+def plain_text(data: bytes) -> str:
+    """Text of an editor of any kind: UTF-8, with its mark or without, or Latin-1; any line ends.
+
+    Blanks that do not break, and the like, are blanks.
+    """
+    text = decoded(data).replace("\r\n", "\n").replace("\r", "\n")
+    return re.sub("[\u00a0\u2000-\u200b\u202f\ufeff]", " ", text)
+
+
+def _meant(text: str, error: str) -> str:
+    """What is probably meant at the place of an error: a comma, quotes or dashes of other kinds."""
+    place = re.search(r"at line (\d+), column (\d+)", error)
+    lines = text.splitlines()
+    if place is None or not 0 < int(place.group(1)) <= len(lines):
+        return ""
+    line = lines[int(place.group(1)) - 1]
+    bare = re.sub(r"\"[^\"]*\"|'[^']*'|#.*", "", line)  # without texts and comment
+    if re.search("[\u2018-\u201f\x91-\x94]", bare):
+        return "; a quotation mark there is not that of the keyboard"
+    if re.search("[\u2010-\u2015\u2212\x96\x97]", bare):
+        return "; a minus sign there is not that of the keyboard"
+    if re.match(r",\d", line[int(place.group(2)) - 1 :]):
+        return "; the decimal sign is a point"
+    return ""
 
 
 def key_lines(text: str) -> dict[Key, int]:

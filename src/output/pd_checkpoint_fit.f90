@@ -1,0 +1,48 @@
+!> Whether a checkpoint fits the model that is to go on from it.
+module pd_checkpoint_fit
+  use pd_checkpoint, only: checkpoint_t
+  use pd_geometry, only: body_t
+  use pd_kinds, only: wp
+  use pd_model, only: model_t
+  use pd_state, only: state_t
+  implicit none
+  private
+
+  public :: same_points, same_history
+
+contains
+
+  !> Whether the points of a checkpoint are those of the body, boundaries included (a point cloud
+  !> may have changed).
+  pure logical function same_points(checkpoint, model) result(same)
+    type(checkpoint_t), intent(in) :: checkpoint
+    type(model_t),      intent(in) :: model   !! with its body
+
+    if (model%whole%n > 0) then
+      same = are_those_of(model%whole)
+    else
+      same = are_those_of(model%body)
+    end if
+
+  contains
+
+    pure logical function are_those_of(body)
+      type(body_t), intent(in) :: body
+
+      are_those_of = size(checkpoint%volume) == body%n
+      if (are_those_of) are_those_of = all(abs(checkpoint%position - body%position) <= 0.0_wp) &
+        .and. all(abs(checkpoint%volume - body%volume) <= 0.0_wp) &
+        .and. all(checkpoint%boundary == body%boundary)
+    end function are_those_of
+
+  end function same_points
+
+  !> Whether the points of a state from a checkpoint remember as much as the laws of the model.
+  pure logical function same_history(state, model) result(same)
+    type(state_t), intent(in) :: state
+    type(model_t), intent(in) :: model
+
+    same = size(state%history, 2) == size(model%materials%remembered())
+  end function same_history
+
+end module pd_checkpoint_fit
