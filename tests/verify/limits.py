@@ -16,7 +16,6 @@ import argparse
 import os
 import platform
 import re
-import shutil
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
@@ -30,6 +29,7 @@ from limit_cases import CASES, CYLINDER_RADIUS, C, Found, Variant
 from matplotlib.figure import Figure
 from perigeo_post import PostError, Run
 from perigeo_post.draw.style import new_figure, style
+from PIL import Image
 from verify import PROGRAM, ROOT, execute
 
 RESULTS = ROOT / "results" / "limit_loads"
@@ -187,7 +187,9 @@ def publish(pictures: list[Path]) -> None:
     content = (RESULTS / "limit_loads.md").read_text()
     PAGE.write_text(f"{before}{MARKS[0]}\n{content}{MARKS[1]}{after}")
     for picture in pictures:
-        shutil.copy(picture, FIGURES / f"limit_load_{picture.name}")
+        shown = FIGURES / f"limit_load_{picture.name}"
+        if shown.name in before + after:  # a palette, to keep the repository small
+            Image.open(picture).convert("RGB").quantize(128).save(shown, optimize=True)
 
 
 def main() -> int:
