@@ -1,31 +1,47 @@
 !> Options that answer without a run: --help, --version, --input-reference, --print-input, --check.
 module pd_check
   use, intrinsic :: iso_fortran_env, only: output_unit
-  use omp_lib, only: omp_get_max_threads
-  use pd_command_line, only: options_t, print_help
+  use omp_lib, only: omp_get_max_threads, omp_set_num_threads
+  use pd_command_line, only: options_t, print_help, read_command_line
   use pd_division, only: share_t, shares
   use pd_doubt_list, only: write_doubt_table
-  use pd_errors, only: error_list_t, exit_file, exit_input, exit_ok, outcome_t
+  use pd_errors, only: error_list_t, exit_command_line, exit_file, exit_input, exit_ok, outcome_t
   use pd_input, only: print_input
   use pd_input_reference, only: write_input_reference, write_input_reference_json
   use pd_input_types, only: all_keys
   use pd_kinds, only: wp
   use pd_points_file, only: write_points
-  use pd_ranks, only: ranks_t
+  use pd_ranks, only: begin_ranks, ranks_t
   use pd_room, only: machine_memory
-  use pd_run, only: run_t, words_on_cores
+  use pd_run, only: run_t
   use pd_size, only: memory_in_words
   use pd_stability, only: find_highest_frequency
   use pd_summary, only: estimated_seconds, memory_of_run, summarise, summary_t
   use pd_text, only: integer_text, short_number
-  use pd_threads, only: choose_threads
+  use pd_threads, only: choose_threads, words_on_cores
   use pd_version, only: code_version, git_hash
   implicit none
   private
 
-  public :: answer_questions, print_check
+  public :: begin_program, print_check
 
 contains
+
+  !> Ranks, threads and options; where the command line asks what needs no model, the answer.
+  !>
+  !> Errors: a wrong command line.
+  subroutine begin_program(options, ranks, outcome)
+    type(options_t), intent(out)   :: options
+    type(ranks_t),   intent(out)   :: ranks
+    type(outcome_t), intent(inout) :: outcome
+    type(error_list_t) :: errors
+
+    call begin_ranks(ranks)
+    call read_command_line(options, errors)
+    call outcome%end_if_any(errors, exit_command_line)
+    if (.not. outcome%done) call answer_questions(options, ranks, outcome)
+    if (options%threads > 0) call omp_set_num_threads(options%threads)
+  end subroutine begin_program
 
   !> Answer what needs no model; the program then ends. Rank 0 answers.
   subroutine answer_questions(options, ranks, outcome)
@@ -109,8 +125,8 @@ contains
       / real(max(1, of_rank%rows), wp)))//' of the own ones; displacement and force tensor, '// &
       short_number(48.0e-3_wp * real(maxval(of_rank%halo), wp))//' kB per step'
     write (output_unit, '(a)') '  set-up              that of the whole body, by every rank'
-    if (words_on_cores(run%ranks) /= '') &
-      write (output_unit, '(a)') '  cores               '//words_on_cores(run%ranks)
+    if (words_on_cores(run%ranks%count) /= '') &
+      write (output_unit, '(a)') '  cores               '//words_on_cores(run%ranks%count)
   end subroutine print_shares
 
   !> Last line of --check.

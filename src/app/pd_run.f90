@@ -1,14 +1,15 @@
 !> A run: what it consists of, and how it begins.
 module pd_run
   use, intrinsic :: iso_fortran_env, only: compiler_version, int64, output_unit
-  use omp_lib, only: omp_get_max_threads, omp_get_num_procs
+  use omp_lib, only: omp_get_max_threads
   use pd_body_force, only: body_force_t, new_body_force
   use pd_checkpoint, only: checkpoint_mark, checkpoint_t
-  use pd_checkpoint_fit, only: same_history, same_points
+  use pd_checkpoint_fit, only: compare_history, compare_points
   use pd_clock, only: clock_t
   use pd_command_line, only: options_t
   use pd_division, only: divide_model
   use pd_doubt_list, only: doubts_t
+  use pd_earlier_run, only: largest_reaction_before, load_doubts, look_for_end, results_in_the_way
   use pd_errors, only: error_list_t, exit_file, exit_input, exit_model, exit_ok, outcome_t
   use pd_files, only: prepare_folder
   use pd_history_columns, only: history_columns
@@ -23,9 +24,8 @@ module pd_run
   use pd_own_files, only: keep_inputs, lock_path
   use pd_plausibility, only: look_at_model, look_at_motion
   use pd_ranks, only: ranks_t
-  use pd_record, only: largest_reaction_before, load_checkpoint, load_doubts, look_for_end, &
-    observe_state, open_record, record_doubts, record_frame, record_line, record_progress, &
-    record_row, record_t, results_in_the_way
+  use pd_record, only: load_checkpoint, observe_state, open_record, record_doubts, record_frame, &
+    record_line, record_progress, record_row, record_t
   use pd_reversal, only: new_reversal, reversal_t
   use pd_run_description, only: provenance_t
   use pd_schedule, only: schedule_t
@@ -38,17 +38,15 @@ module pd_run
   use pd_step, only: step_work_t
   use pd_step_limit, only: new_step_limit, step_limit_t
   use pd_summary, only: summarise, summary_t
-  use pd_system, only: pending_signal
   use pd_tables, only: new_table
-  use pd_text, only: integer_text
-  use pd_threads, only: choose_threads, spare_threads
+  use pd_threads, only: choose_threads, spare_threads, words_on_cores
   use pd_timing, only: timing_t
   use pd_version, only: build_flags, code_version, git_hash
   implicit none
   private
 
   public :: run_t, set_up_run, open_outputs, start_increments, add_release
-  public :: keep_standing_load, signal_of, any_rank, words_on_cores
+  public :: keep_standing_load
 
   type :: run_t
     type(ranks_t)      :: ranks               !! that share it
@@ -79,27 +77,6 @@ module pd_run
 
 contains
 
-  !> The signal that any rank has received, 0: none.
-  integer function signal_of(run) result(signal)
-    type(run_t), intent(in) :: run
-    integer :: found(1)
-
-    found = pending_signal()
-    call run%ranks%largest_numbers(found)
-    signal = found(1)
-  end function signal_of
-
-  !> Whether something is so on any rank. Every rank must come here.
-  logical function any_rank(run, here)
-    type(run_t), intent(in) :: run
-    logical,     intent(in) :: here
-    integer :: found(1)
-
-    found = merge(1, 0, here)
-    call run%ranks%largest_numbers(found)
-    any_rank = found(1) > 0
-  end function any_rank
-
   !> Input, body, model, time step, and the state to begin with: unloaded, or of a checkpoint.
   subroutine set_up_run(options, run, outcome)
     type(options_t), intent(in)    :: options
@@ -123,32 +100,20 @@ contains
     call outcome%end_if_any(input_errors, exit_input)
     call outcome%end_if_any(errors, exit_model)
     if (outcome%done) return
-    if (run%checkpoint%history_rows > 0) then
-      if (.not. same_points(run%checkpoint, run%model)) call errors%add( &
-        'the points are not those of the checkpoint', run%input%path, &
-        allowed='the same body and file of points, or --force for a new run')
-      call outcome%end_if_any(errors, exit_input)
-      if (outcome%done) return
-    end if
+    call compare_points(run%checkpoint, run%model, run%input%path, errors)
+    call outcome%end_if_any(errors, exit_input)
+    if (outcome%done) return
     call set_up_model(run%input, run%model, errors, run%stages(run%checkpoint%clock%stage))
     call try_later_stages(run, options%check, errors)
     call outcome%end_if_any(errors, exit_model)
     if (outcome%done) return
     call keep_standing_load(run, run%stages(run%checkpoint%clock%stage), run%model)
     call look_at_model(run%input, run%model, run%doubts)
-    if (run%checkpoint%history_rows > 0) then
-      if (.not. same_history(run%state, run%model)) &
-        call errors%add('the laws remember something else than in the checkpoint', run%input%path, &
-        allowed='the version of perigeo that wrote it, or --force for a new run')
-      call outcome%end_if_any(errors, exit_file)
-      if (outcome%done) return
-    end if
-    if (.not. options%check) then
-      call outcome%agree(run%ranks)
-      if (outcome%done) return
-      call run%ranks%largest_numbers(run%doubts%step)   ! what has been told is not looked at again
-      call divide_model(run%ranks, run%model)
-    end if
+    call compare_history(run%checkpoint, run%state, run%model, run%input%path, errors)
+    call outcome%end_if_any(errors, exit_file)
+    if (outcome%done) return
+    if (.not. options%check) call divide_run(run, outcome)
+    if (outcome%done) return
     run%clock = run%checkpoint%clock
     run%limit = run%checkpoint%limit
     call set_up_schedule(run%input, run%clock, run%model, run%schedule, errors)
@@ -165,6 +130,17 @@ contains
     if (run%ranks%count == 1) call choose_threads(options%threads, run%model)
     call begin_state(run)
   end subroutine set_up_run
+
+  !> Divide the model among the ranks, if all of them have set it up.
+  subroutine divide_run(run, outcome)
+    type(run_t),     intent(inout) :: run
+    type(outcome_t), intent(inout) :: outcome
+
+    call outcome%agree(run%ranks)
+    if (outcome%done) return
+    call run%ranks%largest_numbers(run%doubts%step)   ! what has been told is not looked at again
+    call divide_model(run%ranks, run%model)
+  end subroutine divide_run
 
   !> The body of the present stage and, where there are several, the points of all of them.
   subroutine set_up_bodies(run, input_errors, errors)
@@ -261,20 +237,6 @@ contains
 
     stem = run%input%run%output_dir//'/'//run%input%run%name
   end function stem_of
-
-  !> What is to be said of threads that share the cores that mpirun has given a rank; '': nothing.
-  function words_on_cores(ranks) result(text)
-    type(ranks_t), intent(in) :: ranks
-    character(:), allocatable :: text
-    integer :: threads, cores
-
-    text = ''
-    threads = omp_get_max_threads()
-    cores = omp_get_num_procs()
-    if (ranks%count > 1 .and. threads > cores) text = integer_text(threads)// &
-      ' threads of a rank share '//integer_text(cores)//' of the cores; mpirun --map-by '// &
-      'slot:PE=N gives each rank N of them'
-  end function words_on_cores
 
   !> Results of an earlier run are overwritten or continued only on request, those of a living one
   !> never; a checkpoint is read if the run continues from it.
@@ -424,12 +386,7 @@ contains
       do i = 1, size(summary%lines)
         call record_line(record, trim(summary%lines(i)), errors)
       end do
-      do i = 1, run%doubts%count()
-        call record_line(record, 'warning: '//run%doubts%message(i), errors)
-      end do
-      call record_doubts(record, run%doubts, errors)
-      if (words_on_cores(run%ranks) /= '') &
-        call record_line(record, 'warning: '//words_on_cores(run%ranks), errors)
+      call record_warnings(run%doubts, words_on_cores(run%ranks%count), record, errors)
       if (run%checkpoint%history_rows > 0) call largest_reaction_before(record, run%model, &
         run%checkpoint%history_rows, run%largest_reaction)
       call observe_state(run%model, run%state, run%ledger, run%clock, record)
@@ -457,5 +414,20 @@ contains
     call system_clock(run%last_checkpoint)
     run%loop_start = run%last_checkpoint
   end subroutine open_outputs
+
+  !> Lines of the log on what is doubtful from the start, and on threads.
+  subroutine record_warnings(doubts, on_threads, record, errors)
+    type(doubts_t),     intent(in)    :: doubts
+    character(*),       intent(in)    :: on_threads   !! '': nothing
+    type(record_t),     intent(inout) :: record
+    type(error_list_t), intent(inout) :: errors
+    integer :: i
+
+    do i = 1, doubts%count()
+      call record_line(record, 'warning: '//doubts%message(i), errors)
+    end do
+    call record_doubts(record, doubts, errors)
+    if (on_threads /= '') call record_line(record, 'warning: '//on_threads, errors)
+  end subroutine record_warnings
 
 end module pd_run

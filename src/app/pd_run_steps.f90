@@ -2,13 +2,14 @@
 !> signal stops the run.
 module pd_run_steps
   use, intrinsic :: iso_fortran_env, only: int64
+  use pd_agreement, only: any_rank
   use pd_doubts, only: look_at_balance, look_at_frame
   use pd_errors, only: error_list_t, exit_file, exit_interrupted, exit_terminated, outcome_t
   use pd_kinds, only: wp
   use pd_progress, only: progress_due
   use pd_record, only: observe_state, record_frame, record_line, record_progress, record_row, &
     save_checkpoint
-  use pd_run, only: any_rank, run_t
+  use pd_run, only: run_t
   use pd_run_end, only: fail
   use pd_system, only: pending_signal, sigint, signal_name
   use pd_timing, only: kernel_history
@@ -91,7 +92,7 @@ contains
       'stopped by a signal ('//signal_name(due%signal)// &
       '); --restart goes on from the checkpoint', errors)
     in_trouble = errors%count() > 0
-    if (due%anything .or. due%progress) in_trouble = any_rank(run, in_trouble)
+    if (due%anything .or. due%progress) in_trouble = any_rank(run%ranks, in_trouble)
     if (in_trouble .and. .not. due%whole) then
       run%trouble = errors   ! one step more, whose state can be kept
       return

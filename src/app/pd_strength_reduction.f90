@@ -5,13 +5,14 @@
 !> interval between a factor that it bears and one that it does not gives the factor of safety.
 !> Source: doc/theory.md, section 6.
 module pd_strength_reduction
+  use pd_agreement, only: signal_of
   use pd_errors, only: error_list_t, exit_file, exit_interrupted, exit_terminated, outcome_t
   use pd_forces, only: forces
   use pd_kinds, only: wp
   use pd_materials, only: material_t
   use pd_record, only: record_frame, record_line, record_tries, save_checkpoint
   use pd_relaxation, only: keep_start, relax, relaxed_t, return_to_start
-  use pd_run, only: run_t, signal_of
+  use pd_run, only: run_t
   use pd_run_end, only: fail, fastest_row
   use pd_state, only: state_t
   use pd_system, only: sigint, signal_name
@@ -48,16 +49,16 @@ contains
           fastest_row(run), run, outcome)
         return
       end if
-      if (signal_of(run) == 0) call try(given%last, start, unreduced, run, tries, errors)
+      if (signal_of(run%ranks) == 0) call try(given%last, start, unreduced, run, tries, errors)
       moving = run%state
-      do while (signal_of(run) == 0 .and. .not. tries%held(2) &
+      do while (signal_of(run%ranks) == 0 .and. .not. tries%held(2) &
         .and. tries%most() - tries%least() > given%tolerance)
         call try(0.5_wp * (tries%least() + tries%most()), start, unreduced, run, tries, errors)
         if (tries%held(tries%n)) held = run%state
         if (.not. tries%held(tries%n)) moving = run%state
       end do
     end associate
-    if (signal_of(run) /= 0) then
+    if (signal_of(run%ranks) /= 0) then
       run%state = start
       call stop_by_signal(run, outcome, errors)
       return
@@ -117,7 +118,7 @@ contains
     type(error_list_t), intent(inout) :: errors
     integer :: signal
 
-    signal = signal_of(run)
+    signal = signal_of(run%ranks)
     call save_checkpoint(run%model, run%state, run%ledger, run%clock, run%limit, run%record, &
       errors)
     if (errors%count() == 0) call record_line(run%record, &

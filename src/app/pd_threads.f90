@@ -5,16 +5,17 @@
 !> Source: doc/performance.md, how many threads.
 module pd_threads
   use, intrinsic :: iso_fortran_env, only: int64
-  use omp_lib, only: omp_get_max_threads, omp_set_num_threads
+  use omp_lib, only: omp_get_max_threads, omp_get_num_procs, omp_set_num_threads
   use pd_forces, only: linear_forces
   use pd_input_shapes, only: find_extents
   use pd_input_types, only: input_t
   use pd_kinds, only: wp
   use pd_model, only: model_t
+  use pd_text, only: integer_text
   implicit none
   private
 
-  public :: choose_threads, spare_threads
+  public :: choose_threads, spare_threads, words_on_cores
 
   integer, parameter :: few = 1000       !! points, for which one thread is best on any machine
   integer, parameter :: many = 100000    !! points, for which all cores are
@@ -78,5 +79,19 @@ contains
     call system_clock(finish)
     seconds = real(finish - start, wp) / real(rate, wp)
   end function seconds_of_passes
+
+  !> What is to be said of threads that share the cores that mpirun has given a rank; '': nothing.
+  function words_on_cores(ranks) result(text)
+    integer, intent(in) :: ranks
+    character(:), allocatable :: text
+    integer :: threads, cores
+
+    text = ''
+    threads = omp_get_max_threads()
+    cores = omp_get_num_procs()
+    if (ranks > 1 .and. threads > cores) text = integer_text(threads)// &
+      ' threads of a rank share '//integer_text(cores)//' of the cores; mpirun --map-by '// &
+      'slot:PE=N gives each rank N of them'
+  end function words_on_cores
 
 end module pd_threads

@@ -3,14 +3,12 @@
 !> The algorithm and nothing else; doc/theory.md, section 6: u gives H, H gives the stress and A,
 !> A gives f, f gives v.
 program perigeo
-  use omp_lib, only: omp_set_num_threads
-  use pd_check, only: answer_questions, print_check
-  use pd_command_line, only: options_t, read_command_line
+  use pd_check, only: begin_program, print_check
+  use pd_command_line, only: options_t
   use pd_doubts, only: look_at_end, look_at_time_step
-  use pd_errors, only: error_list_t, exit_command_line, outcome_t
+  use pd_errors, only: outcome_t
   use pd_exit, only: leave
   use pd_increment, only: take_increment
-  use pd_ranks, only: begin_ranks
   use pd_run, only: open_outputs, run_t, set_up_run
   use pd_run_end, only: close_run, end_without_equilibrium, finish_run
   use pd_run_stages, only: begin_stage_if_due
@@ -23,15 +21,10 @@ program perigeo
   type(options_t) :: options
   type(run_t)     :: run
   type(outcome_t) :: outcome
-  type(error_list_t) :: errors
   type(due_t)     :: due
   integer         :: failed_row
 
-  call begin_ranks(run%ranks)
-  call read_command_line(options, errors)
-  call outcome%end_if_any(errors, exit_command_line)
-  if (.not. outcome%done) call answer_questions(options, run%ranks, outcome)
-  if (options%threads > 0) call omp_set_num_threads(options%threads)
+  call begin_program(options, run%ranks, outcome)
   if (.not. outcome%done) call set_up_run(options, run, outcome)
   call outcome%agree(run%ranks)
   if (options%check .and. .not. outcome%done) &

@@ -61,14 +61,10 @@ module pd_operators
     procedure :: hand_over_block
     procedure :: share
     procedure :: force_block
-    procedure :: set_control
-    procedure :: control_energy
-    procedure :: set_relaxing
-    procedure :: relaxing_energy
+    procedure :: set_control, control_energy
+    procedure :: set_relaxing, relaxing_energy
     procedure :: needed_rows
-    procedure, private :: residual_sums
-    procedure, private :: weigh_in
-    procedure, private :: weigh_block
+    procedure, private :: residual_sums, weigh_in, weigh_block
     procedure(gradient_of), deferred :: gradient_sums_block
     procedure(divergence_of), deferred :: divergence_sums_block
     procedure(control_of), deferred :: control_sums_block
@@ -171,14 +167,13 @@ contains
   subroutine weigh_in(self, u)
     class(operators_t), intent(inout) :: self
     real(wp), intent(in), contiguous :: u(:, :)   !! (n,2) [m]
-    integer :: rows(2)
 
-    rows = self%domain%known
     if (self%weighs) then
       call self%domain%make_room(self%n, 2, self%weighed)
-      call weigh_rows(rows, self%share_of, u, self%weighed)
+      call weigh_rows(self%domain%known, self%share_of, u, self%weighed)
     end if
-    if (allocated(self%pull)) call weigh_rows(rows, self%share_of, u, self%pull, self%control)
+    if (allocated(self%pull)) &
+      call weigh_rows(self%domain%known, self%share_of, u, self%pull, self%control)
   end subroutine weigh_in
 
   !> A <- A times the share of the points, for rows lo to hi.

@@ -1,6 +1,7 @@
 !> Whether a checkpoint fits the model that is to go on from it.
 module pd_checkpoint_fit
   use pd_checkpoint, only: checkpoint_t
+  use pd_errors, only: error_list_t
   use pd_geometry, only: body_t
   use pd_kinds, only: wp
   use pd_model, only: model_t
@@ -8,9 +9,36 @@ module pd_checkpoint_fit
   implicit none
   private
 
-  public :: same_points, same_history
+  public :: compare_points, compare_history
 
 contains
+
+  !> Report an error where the points are not those of the checkpoint, if there is one.
+  subroutine compare_points(checkpoint, model, path, errors)
+    type(checkpoint_t), intent(in)    :: checkpoint   !! history_rows 0: there is none
+    type(model_t),      intent(in)    :: model        !! with its body
+    character(*),       intent(in)    :: path         !! of the input
+    type(error_list_t), intent(inout) :: errors
+
+    if (checkpoint%history_rows == 0) return
+    if (.not. same_points(checkpoint, model)) call errors%add( &
+      'the points are not those of the checkpoint', path, &
+      allowed='the same body and file of points, or --force for a new run')
+  end subroutine compare_points
+
+  !> Report an error where the laws remember something else than in the checkpoint.
+  subroutine compare_history(checkpoint, state, model, path, errors)
+    type(checkpoint_t), intent(in)    :: checkpoint   !! history_rows 0: there is none
+    type(state_t),      intent(in)    :: state        !! from it
+    type(model_t),      intent(in)    :: model
+    character(*),       intent(in)    :: path         !! of the input
+    type(error_list_t), intent(inout) :: errors
+
+    if (checkpoint%history_rows == 0) return
+    if (.not. same_history(state, model)) call errors%add( &
+      'the laws remember something else than in the checkpoint', path, &
+      allowed='the version of perigeo that wrote it, or --force for a new run')
+  end subroutine compare_history
 
   !> Whether the points of a checkpoint are those of the body, boundaries included (a point cloud
   !> may have changed).

@@ -2,7 +2,8 @@
 !>
 !> The only module that knows both the physics and the output.
 module pd_record
-  use pd_checkpoint, only: checkpoint_exists, checkpoint_t, read_checkpoint, remove_checkpoints, &
+  use pd_agreement, only: any_rank
+  use pd_checkpoint, only: checkpoint_t, read_checkpoint, remove_checkpoints, &
     write_checkpoint
   use pd_clock, only: clock_t
   use pd_division, only: bring_looked_at
@@ -14,28 +15,28 @@ module pd_record
   use pd_history, only: close_history, create_history, history_t, read_history, resume_history, &
     write_row
   use pd_history_columns, only: history_columns
-  use pd_input, only: compare_used, same_end, used_values
+  use pd_input, only: compare_used, used_values
   use pd_input_types, only: input_t
   use pd_kinds, only: is_set, wp
   use pd_ledger, only: ledger_t
   use pd_model, only: model_t
   use pd_observe, only: column_t, moment_at, moment_t, observation_t, observe
   use pd_progress, only: close_progress, open_progress, progress_t, say, show_progress, status_t
-  use pd_result, only: add_row, attend_result, create_result, finish_result, places_t, read_end, &
-    result_exists, result_t, resume_result, write_failed_frame, write_frame, write_rows, write_tries
+  use pd_result, only: add_row, attend_result, create_result, finish_result, places_t, &
+    result_t, resume_result, write_failed_frame, write_frame, write_rows, write_tries
   use pd_run_description, only: provenance_t, run_description_t
   use pd_schedule, only: schedule_t
   use pd_state, only: state_t
   use pd_step_limit, only: step_limit_t
   use pd_tries, only: tries_t
-  use pd_trust, only: largest_of_column, quality_t, read_doubts, write_doubts, write_quality
+  use pd_trust, only: quality_t, write_doubts, write_quality
   implicit none
   private
 
-  public :: record_t, results_in_the_way, look_for_end
+  public :: record_t
   public :: open_record, close_record, record_row, record_frame
   public :: record_failure, record_progress, record_line, observe_state
-  public :: record_doubts, record_quality, load_doubts, largest_reaction_before
+  public :: record_doubts, record_quality
   public :: record_tries, save_checkpoint, save_last_checkpoint, load_checkpoint
 
   !> The open outputs of a run.
@@ -57,30 +58,6 @@ module pd_record
     'initial_strain_energy', 'largest_work', 'outer_work']
 
 contains
-
-  !> Whether an earlier run left results or checkpoints under this stem.
-  logical function results_in_the_way(stem)
-    character(*), intent(in) :: stem   !! output folder and name of the run
-
-    results_in_the_way = result_exists(stem)
-    if (.not. results_in_the_way) results_in_the_way = checkpoint_exists(stem)
-  end function results_in_the_way
-
-  !> Whether the result of a run is complete, and whether that is all that the input asks for: the
-  !> same run to the same end.
-  subroutine look_for_end(input, complete, same)
-    type(input_t), intent(in)  :: input
-    logical,       intent(out) :: complete, same
-    type(error_list_t) :: different
-    type(run_description_t) :: old, new
-
-    call read_end(input%run%output_dir//'/'//input%run%name//'.h5', complete, old%values)
-    same = .false.
-    if (.not. complete) return
-    new%values = used_values(input)
-    call compare_used(old%values, new%values, different)
-    same = different%count() == 0 .and. same_end(old%values, new%values)
-  end subroutine look_for_end
 
   !> Open all outputs: new ones, or those of a checkpoint (with rows in the history).
   !>
@@ -331,36 +308,6 @@ contains
     if (.not. record%elsewhere) call write_quality(record%result%path, quality, errors)
   end subroutine record_quality
 
-  !> The doubts that were told during the run before a checkpoint.
-  subroutine load_doubts(stem, checkpoint, doubts)
-    character(*),       intent(in)    :: stem
-    type(checkpoint_t), intent(in)    :: checkpoint
-    type(doubts_t),     intent(inout) :: doubts
-
-    call read_doubts(stem//'.h5', checkpoint%clock%step, doubts)
-  end subroutine load_doubts
-
-  !> Largest normal force of a platen in the first rows of the history [N/m]; 0 without platens.
-  subroutine largest_reaction_before(record, model, rows, largest)
-    type(record_t), intent(in)  :: record
-    type(model_t),  intent(in)  :: model
-    integer,        intent(in)  :: rows
-    real(wp),       intent(out) :: largest
-    character(1), parameter :: axes(2) = ['x', 'y']
-    real(wp) :: found(1)
-
-    found = 0.0_wp
-    associate (p => model%platens, items => model%supports%items)
-      if (p%axis > 0 .and. .not. record%elsewhere) found = max( &
-        largest_of_column(record%result%path, rows, items(p%first)%support%name//'_force_'// &
-        axes(p%axis)), &
-        largest_of_column(record%result%path, rows, items(p%second)%support%name//'_force_'// &
-        axes(p%axis)))
-    end associate
-    call model%blocks%ranks%fill_in(found)
-    largest = found(1)
-  end subroutine largest_reaction_before
-
   !> Write a checkpoint of the state after a step, but first the rows of the history before it.
   subroutine save_checkpoint(model, state, ledger, clock, limit, record, errors)
     type(model_t),      intent(in)    :: model
@@ -374,8 +321,8 @@ contains
 
     before = errors%count()
     if (.not. record%elsewhere) call write_rows(record%result, errors)
-    if (.not. any_rank(model, errors%count() > before)) call put_checkpoint(model, state, ledger, &
-      clock, limit, record, errors)
+    if (any_rank(model%blocks%ranks, errors%count() > before)) return
+    call put_checkpoint(model, state, ledger, clock, limit, record, errors)
   end subroutine save_checkpoint
 
   !> Write a last checkpoint where a file cannot be written: a restart writes what is owed. It takes
@@ -392,23 +339,12 @@ contains
     type(error_list_t) :: known
 
     if (.not. (record%result%is_lost .or. record%elsewhere)) call write_rows(record%result, known)
-    if (any_rank(model, record%result%is_foreign)) then
+    if (any_rank(model%blocks%ranks, record%result%is_foreign)) then
       call errors%add('no checkpoint is written: another run writes these files')
     else
       call put_checkpoint(model, state, ledger, clock, limit, record, errors)
     end if
   end subroutine save_last_checkpoint
-
-  !> Whether something is so on any rank: only the one that writes knows of files.
-  logical function any_rank(model, here)
-    type(model_t), intent(in) :: model
-    logical,       intent(in) :: here
-    integer :: found(1)
-
-    found = merge(1, 0, here)
-    call model%blocks%ranks%largest_numbers(found)
-    any_rank = found(1) > 0
-  end function any_rank
 
   subroutine put_checkpoint(model, state, ledger, clock, limit, record, errors)
     type(model_t),      intent(in)    :: model

@@ -17,11 +17,11 @@ module pd_result
   use pd_labels, only: label_t
   use pd_model, only: model_t
   use pd_observe, only: column_t, moment_t
+  use pd_old_frames, only: check_old_frames
   use pd_result_tries, only: put_tries
   use pd_rows, only: check_rows, compare_rows, copy_rows, put_rows, reserve_rows, resize_rows, &
     rows_in
-  use pd_run_description, only: run_description_t, schema, schema_version, write_description, &
-    writer_of
+  use pd_run_description, only: run_description_t, write_description, writer_of
   use pd_state, only: state_t
   use pd_system, only: remove_file
   use pd_text, only: integer_text
@@ -419,38 +419,6 @@ contains
     call close_file(file, not_of_interest)
     ignored = remove_file(result%path//'.tmp')
   end subroutine discard
-
-  !> Report an error unless the old file holds the frames that are to be kept.
-  subroutine check_old_frames(old, path, n_kept, step, errors)
-    type(hdf5_file_t),  intent(inout) :: old
-    character(*),       intent(in)    :: path
-    integer,            intent(in)    :: n_kept, step
-    type(error_list_t), intent(inout) :: errors
-    character(:), allocatable :: found
-    integer :: i, before, frame_step, written, version, n_frames
-
-    before = errors%count()
-    call read_attribute(old, '/', 'schema', found, errors)
-    call read_attribute(old, '/', 'schema_version', version, errors)
-    call read_attribute(old, '/', 'n_frames', n_frames, errors)
-    if (.not. old%is_good()) return
-    if (found /= schema .or. version /= schema_version) then
-      call errors%add('is not a result file of this version of the program', where=path)
-      return
-    end if
-    do i = 0, n_kept - 1
-      written = 0
-      if (i < n_frames) then
-        call read_attribute(old, frame_name(i), 'written', written, errors)
-        call read_attribute(old, frame_name(i), 'step', frame_step, errors)
-        if (errors%count() > before) return
-      end if
-      if (written == 1 .and. frame_step <= step) cycle
-      call errors%add('frame '//frame_name(i)//' was written before the checkpoint and is ' &
-        //'missing: this is not the result file that the checkpoint belongs to', where=path)
-      return
-    end do
-  end subroutine check_old_frames
 
   !> The moment with the nominal strain to be written: NaN where there are no platens.
   function with_strain(result, moment) result(written)
