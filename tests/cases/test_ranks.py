@@ -39,10 +39,14 @@ def ranked(program):
     path = program.with_name(program.name.replace("perigeo", "perigeo-mpi"))
     if not path.is_file():
         pytest.skip(f"{path.name} is not there; make MPI=1 builds it")
-    if path.stat().st_mtime < program.stat().st_mtime:
-        pytest.skip(f"{path.name} is older than {program.name}; make MPI=1 builds it")
     if not shutil.which("mpirun"):
         pytest.skip("mpirun is not there")
+    versions = [
+        subprocess.run([file, "--version"], capture_output=True, check=False).stdout
+        for file in (program, path)
+    ]
+    if versions[0] != versions[1]:
+        pytest.skip(f"{path.name} is of another version than {program.name}; make MPI=1 builds it")
     return path
 
 
