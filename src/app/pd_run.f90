@@ -19,7 +19,7 @@ module pd_run
   use pd_kinds, only: is_set, wp
   use pd_ledger, only: ledger_t, new_ledger
   use pd_lock, only: lock_holder, lock_t, take_lock
-  use pd_model, only: model_t, move_planes, release_set_up, start
+  use pd_model, only: model_t, release_set_up, start
   use pd_observe, only: column_t, moment_at, observation_t, observe
   use pd_own_files, only: keep_inputs, lock_path
   use pd_plausibility, only: look_at_model, look_at_motion
@@ -337,7 +337,7 @@ contains
         state%strength = model%strength
         call add_release(run%stages(run%clock%stage), state, model)
         call ledger%fit(model%blocks)
-        call move_planes(model, run%clock%time())
+        call model%operators%mirror%move(run%clock%time())
         call model%operators%take_in(state%displacement, model%operators%mirror%place)
         call model%supports%take_reactions(model%points%volume, run%clock%time(), state%force)
         call state%forget(model%operators%domain%kept(model%operators%n))

@@ -14,8 +14,8 @@ module pd_rigid_support
   public :: rigid_support_t, new_rigid_support
 
   type, extends(support_t) :: rigid_support_t
-    logical, private :: prescribed(2) = .false.
-    type(table_t), private :: velocity(2)                !! x, y [m/s]
+    logical :: prescribed(2) = .false.                   !! x, y
+    type(table_t) :: velocity(2)                         !! x, y [m/s]
     real(wp), private :: mass(2) = 0.0_wp                !! that moves with it [kg/m]
     real(wp), private :: force_before(2) = 0.0_wp        !! `force` in the step before [N/m]
   contains

@@ -45,11 +45,13 @@ contains
     class(sliding_support_t), intent(in)    :: self
     real(wp),                 intent(in)    :: t
     real(wp),                 intent(inout) :: u(:, :), v(:, :)
-    real(wp) :: kept(size(self%points), 2)
+    integer :: c
 
-    kept = u(self%points, :)
-    call self%rigid_support_t%prescribe(t, u, v)
-    u(self%points, :) = kept
+    associate (not_moved => u)
+    end associate
+    do c = 1, 2
+      if (self%prescribed(c)) v(self%points, c) = self%velocity(c)%rate(t)
+    end do
   end subroutine prescribe
 
   !> - 2 sum V f along the normal.

@@ -72,12 +72,11 @@ contains
   !> Which rows are known to all ranks.
   subroutine share_rows(model)
     type(model_t), intent(inout) :: model
-    logical, dimension(model%operators%n) :: held, pushed, probed
+    logical, dimension(:), allocatable :: held, pushed, probed   ! on the heap: one per row
     integer :: k
 
-    held = .false.
-    pushed = .false.
-    probed = .false.
+    allocate (held(model%operators%n), pushed(model%operators%n), probed(model%operators%n), &
+      source=.false.)
     do k = 1, size(model%supports%items)
       call model%supports%items(k)%support%mark_read(held, pushed)
     end do

@@ -8,7 +8,7 @@ module pd_forces
   use pd_flow, only: flow_t
   use pd_kinds, only: n_block, wp
   use pd_materials, only: materials_t
-  use pd_model, only: model_t, move_planes
+  use pd_model, only: model_t
   use pd_operators, only: operators_t
   use pd_state, only: block_work_t, state_t
   use pd_timing, only: kernel_boundaries, kernel_force, kernel_gradient, now, timing_t
@@ -38,7 +38,7 @@ contains
     type(timing_t),     intent(inout) :: timing
     integer,            intent(out)   :: failed_row
 
-    call move_planes(model, t)
+    call model%operators%mirror%move(t)
     associate (points => model%points)
       call internal_forces(model%operators, model%materials, points%volume, state, work, timing, &
         failed_row)

@@ -14,7 +14,7 @@ module pd_increment
   use pd_forces, only: forces
   use pd_kinds, only: wp
   use pd_ledger, only: ledger_t
-  use pd_model, only: model_t, move_planes
+  use pd_model, only: model_t
   use pd_relaxation, only: keep_start, relax, relaxation_t, relaxed_t, new_relaxation, &
     return_to_start
   use pd_schedule, only: schedule_t
@@ -137,7 +137,7 @@ contains
     associate (mirror => model%operators%mirror)
       if (mirror%n == 0) return
       allocate (place, source=mirror%place)
-      call move_planes(model, t + duration)
+      call mirror%move(t + duration)
       call mirror%carry(mirror%place - place, state%displacement)
     end associate
   end subroutine guess

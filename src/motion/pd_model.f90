@@ -12,12 +12,11 @@ module pd_model
   use pd_state, only: state_t
   use pd_storage, only: storage_t
   use pd_supports, only: supports_t
-  use pd_tables, only: table_t
   implicit none
   private
 
   public :: model_t, damping_frame_t, initial_t, start, damping_frame, release_set_up
-  public :: top_of, move_planes
+  public :: top_of
 
   !> Strain, stress and internal forces of a body with an initial stress, before any motion.
   type :: initial_t
@@ -123,26 +122,8 @@ contains
     call model%supports%share_forces(model%points%volume, 0.0_wp, state%force)
     if (allocated(model%initial)) &   ! the body leans on them from the start
       call model%supports%take_reactions(model%points%volume, 0.0_wp, state%force)
-    call move_planes(model, 0.0_wp)
+    call model%operators%mirror%move(0.0_wp)
     call model%operators%take_in(state%displacement, model%operators%mirror%place)
   end subroutine start
-
-  !> The planes of mirrors are where their supports have moved them at time t.
-  subroutine move_planes(model, t)
-    type(model_t), intent(inout) :: model
-    real(wp),      intent(in)    :: t   !! [s]
-    type(table_t) :: velocity
-    integer :: k
-
-    associate (mirror => model%operators%mirror)
-      if (mirror%n == 0) return
-      do k = 1, size(mirror%support)
-        velocity = model%supports%items(mirror%support(k))%support%common_velocity( &
-          mirror%normal(k))
-        mirror%place(k) = velocity%integral(t)
-        mirror%rate(k) = velocity%rate(t)
-      end do
-    end associate
-  end subroutine move_planes
 
 end module pd_model

@@ -11,6 +11,7 @@ module pd_mirror
   use pd_blocks, only: blocks_t
   use pd_kinds, only: wp
   use pd_shared_rows, only: new_shared_rows, shared_rows_t
+  use pd_tables, only: table_t
   implicit none
   private
 
@@ -25,6 +26,7 @@ module pd_mirror
     integer, allocatable, private :: plane(:)       !! between the two
     integer, allocatable :: support(:)              !! of every plane
     integer, allocatable :: normal(:)               !! axis of every plane; 1: x, 2: y
+    type(table_t), allocatable, private :: velocity(:)   !! dU/dt of every plane [m/s]
     real(wp), allocatable :: place(:)               !! U of every plane [m]
     real(wp), allocatable :: rate(:)                !! dU/dt of every plane [m/s]
     type(shared_rows_t), private :: origins         !! known to all ranks: what has images
@@ -33,6 +35,7 @@ module pd_mirror
     procedure :: moves_with
     procedure :: rows
     procedure :: divide
+    procedure :: move
     procedure :: reflect_motion
     procedure :: hand_back
     procedure :: carry
@@ -44,15 +47,17 @@ contains
   !>
   !> Where two planes meet, or face each other before a thin body, there are images of images: they
   !> come after those.
-  pure type(mirror_t) function new_mirror(row, origin, plane, support, normal) result(mirror)
+  pure type(mirror_t) function new_mirror(row, origin, plane, support, normal, velocity) &
+    result(mirror)
     integer, intent(in) :: row(:), origin(:)        !! of images, and of what they are images of
     integer, intent(in) :: plane(:)                 !! between the two
     integer, intent(in) :: support(:), normal(:)    !! of every plane; axis 1: x, 2: y
+    type(table_t), intent(in) :: velocity(:)        !! of every plane along its normal [m/s]
     integer :: i
     integer, allocatable :: order(:), next(:)
-    logical :: waits(maxval([row, origin, 1]))
+    logical, allocatable :: waits(:)
 
-    waits = .false.
+    allocate (waits(max(maxval(row), maxval(origin))), source=.false.)
     waits(row) = .true.
     allocate (order(0))
     do while (size(order) < size(row))
@@ -67,6 +72,7 @@ contains
     mirror%plane = plane(order)
     mirror%support = support
     mirror%normal = normal
+    mirror%velocity = velocity
     allocate (mirror%place(size(support)), mirror%rate(size(support)), source=0.0_wp)
   end function new_mirror
 
@@ -101,6 +107,19 @@ contains
     marked(self%row) = .true.
     self%both = new_shared_rows(marked, blocks)
   end subroutine divide
+
+  !> The planes go to where they are at time t.
+  pure subroutine move(self, t)
+    class(mirror_t), intent(inout) :: self
+    real(wp),        intent(in)    :: t   !! [s]
+    integer :: k
+
+    if (self%n == 0) return
+    do k = 1, size(self%velocity)
+      self%place(k) = self%velocity(k)%integral(t)
+      self%rate(k) = self%velocity(k)%rate(t)
+    end do
+  end subroutine move
 
   !> A vector field, such as a displacement, at the images; `moved` is what the planes do of the
   !> same kind, absent: nothing.

@@ -10,6 +10,7 @@ module pd_setup_mirror
   use pd_mirror, only: new_mirror
   use pd_model, only: model_t
   use pd_point_sets, only: boundary_set, images_of, point_set_t
+  use pd_tables, only: table_t
   use pd_text, only: numbers_text
   implicit none
   private
@@ -54,15 +55,17 @@ contains
     type(model_t), intent(inout) :: model
     type(point_set_t) :: set
     integer, allocatable :: row(:), origin(:), plane(:), support(:), normal(:)
+    type(table_t), allocatable :: velocity(:)
     integer :: k
 
-    allocate (row(0), origin(0), plane(0), support(0), normal(0))
+    allocate (row(0), origin(0), plane(0), support(0), normal(0), velocity(0))
     do k = 1, size(input%boundaries)
       if (.not. is_bearing(input%boundaries(k))) cycle
       set = boundary_set(input%boundaries(k)%name, model%body%boundary, k)
       if (size(set%points) == 0) cycle
       support = [support, k]
       normal = [normal, input%boundaries(k)%axis]
+      velocity = [velocity, model%supports%items(k)%support%common_velocity(normal(size(normal)))]
       row = [row, set%points]
       origin = [origin, images_of(set%points, model%body%boundary, model%body%place, &
         input%boundaries(k)%axis, rows)]
@@ -71,7 +74,7 @@ contains
     if (size(row) == 0) return
     associate (operators => model%operators)
       operators%mirror = new_mirror(operators%storage%row(row), operators%storage%row(origin), &
-        plane, support, normal)
+        plane, support, normal, velocity)
       operators%k_inverse(operators%mirror%rows(), :) = 0.0_wp   ! images have no gradient
     end associate
   end subroutine set_up_mirror
