@@ -205,6 +205,7 @@ contains
       call operators%force_block(operators%domain%blocks%lo(block), &
         operators%domain%blocks%hi(block), u, n)
     end do
+    call operators%mirror%hand_back(n)
   end subroutine left_by_unit_stress
 
   !> Add to lambda, at some points, what makes N there smaller by `rest`. Conjugate gradients in the

@@ -83,6 +83,18 @@ def test_a_box_of_bearings_keeps_a_homogeneous_strain_into_its_corners(fields, o
     assert np.abs(rows["energy_error"]).max() < 1e-8
 
 
+@pytest.mark.parametrize("operators", ["lattice", "list"])
+def test_a_pressure_between_bearings_is_the_stress_into_the_corners(fields, operators):
+    """Points beside a plane carry the pressure as those before a body that goes on."""
+    text = BOX.replace("'case',", f"'case', operators = '{operators}',").replace("0.8", "1.0")
+    text = text[: text.index("&boundary name = 'top'")] + text[text.index("&output") :]
+    pressed = "&pressure name = 'load', side = 'top', value = 1.0e4 /\n"
+    found, rows = fields(text + pressed + REST)
+    assert np.abs(found["stress"][:, 1] + 1.0e4).max() < 1e-3
+    assert np.abs(found["stress"][:, 0] + 1.0e4 * NU / (1.0 - NU)).max() < 1e-3
+    assert rows["bottom_force_y"][-1] == pytest.approx(1.0e4, rel=1e-8)
+
+
 def test_half_of_a_symmetric_body_is_as_good_as_all_of_it(fields):
     """Footing and base have images beyond the plane too; the body yields."""
     one, whole = fields(WHOLE + REST.replace("1.0e-11", "1.0e-8"))
