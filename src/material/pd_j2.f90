@@ -8,7 +8,7 @@ module pd_j2
   use pd_flow, only: flow_t
   use pd_kinds, only: n_block, wp
   use pd_law, only: law_points_t, law_t
-  use pd_sliding, only: bound_t, slide
+  use pd_sliding, only: slide, sliding_t
   use pd_yielding, only: alpha, gather_points, remembers, scatter_points, yielding_t
   implicit none
   private
@@ -76,46 +76,53 @@ contains
     type(yielding_t), intent(inout) :: points
     real(wp) :: flow(n_block, 4)   !! direction of the flow, of length 1
     real(wp) :: deviator_trial(n_block, 4), first(n_block), da(n_block), q(n_block)
-    integer  :: i
 
     call flow_directions(n, points, deviator_trial, q, flow)
     call increments(material, n, points, q, flow, first, da)
     call move_back_stress(material, n, flow, first, da, points)
     if (material%kinematic_modulus < 0.0_wp) then
-      do i = 1, n
-        if (first(i) < da(i)) call end_on_bound(material, i, q(i), first(i), points, flow, da(i))
-      end do
+      if (any(first(:n) < da(:n))) call end_on_bound(material, n, q, first, points, flow, da)
     end if
     call update_points(material, n, flow, deviator_trial, da, points)
   end subroutine return_to_surface
 
-  !> The rest of the return of a point whose back stress has met its bound.
-  pure subroutine end_on_bound(material, i, q, first, points, flow, da)
+  !> The rest of the return of the points whose back stress has met its bound.
+  pure subroutine end_on_bound(material, n, q, first, points, flow, da)
     class(j2_t),      intent(in)    :: material
-    integer,          intent(in)    :: i
-    real(wp),         intent(in)    :: q, first
+    integer,          intent(in)    :: n
+    real(wp),         intent(in)    :: q(n_block), first(n_block)
     type(yielding_t), intent(inout) :: points
     real(wp),         intent(inout) :: flow(n_block, 4)
-    real(wp),         intent(inout) :: da   !! in: that of a straight path
-    type(bound_t) :: bound
-    real(wp) :: direction(4), beta(4), rest, residual
+    real(wp),         intent(inout) :: da(n_block)   !! in: that of a straight path
+    type(sliding_t) :: sliding
+    real(wp) :: residual, straight(n_block)
+    integer  :: i, k, number(n_block)
 
-    associate (g3 => 3.0_wp * material%shear_modulus, yield_stress => points%yield_stress(i))
-      residual = min(material%residual_strength, yield_stress)
-      bound%g3 = g3
-      bound%h = -material%kinematic_modulus
-      bound%hi = material%isotropic_modulus
-      bound%strength = strength_now(material, yield_stress, points%alpha(i) + first)
-      bound%radius = yield_stress - residual
-      if (bound%hi < 0.0_wp) bound%radius = max(0.0_wp, bound%strength - residual)
-      direction = flow(i, :)
-      beta = points%back_stress(i, :)
-      rest = da - first
-      call slide(bound, q - (g3 + material%kinematic_modulus) * first, direction, beta, rest)
-      da = da + (rest - (da - first))   ! a straight path keeps the bits of its da
-      flow(i, :) = direction
-      points%back_stress(i, :) = beta
-    end associate
+    sliding%g3 = 3.0_wp * material%shear_modulus
+    sliding%h = -material%kinematic_modulus
+    sliding%hi = material%isotropic_modulus
+    k = 0
+    do i = 1, n
+      if (.not. first(i) < da(i)) cycle
+      k = k + 1
+      number(k) = i
+      residual = min(material%residual_strength, points%yield_stress(i))
+      sliding%strength(k) = strength_now(material, points%yield_stress(i), &
+        points%alpha(i) + first(i))
+      sliding%radius(k) = points%yield_stress(i) - residual
+      if (sliding%hi < 0.0_wp) sliding%radius(k) = max(0.0_wp, sliding%strength(k) - residual)
+      sliding%q(k) = q(i) - (sliding%g3 - sliding%h) * first(i)
+      straight(k) = da(i) - first(i)
+    end do
+    sliding%n = k
+    sliding%da(:k) = straight(:k)
+    sliding%flow(:k, :) = flow(number(:k), :)
+    sliding%beta(:k, :) = points%back_stress(number(:k), :)
+    call slide(sliding)
+    flow(number(:k), :) = sliding%flow(:k, :)
+    points%back_stress(number(:k), :) = sliding%beta(:k, :)
+    ! a straight path keeps the bits of its da
+    da(number(:k)) = da(number(:k)) + (sliding%da(:k) - straight(:k))
   end subroutine end_on_bound
 
   !> dev S*, q* = sqrt(3/2)|eta*| and eta* / |eta*|.
@@ -149,69 +156,91 @@ contains
   !> Plastic increments: `first` with both moduli as they are, `da` whole, on a straight path (where
   !> the back stress has met its bound and slides, `slide` finds the rest).
   !>
-  !> `first` ends where sigma_y(alpha) meets sigma_r, or where the back stress b - h da n, with
-  !> b = sqrt(3/2) beta and h = -H_k, meets its bound r - k da, k = -H_i, r = sigma_y - sigma_r
-  !> (sigma_y0 where H_i >= 0: the bound then stays; sigma_r is at most sigma_y0): the smallest
-  !> root da >= 0 of
-  !> (h^2 - k^2) da^2 - 2 (h b . n - r k) da - (r^2 - b . b) = 0, in the form that does not cancel.
-  !> Written without a branch: every quotient is finite, also where it is not used.
+  !> `first` ends where sigma_y(alpha) meets sigma_r, or where the back stress meets its bound.
   pure subroutine increments(material, n, points, q, flow, first, da)
     class(j2_t),      intent(in)  :: material
     integer,          intent(in)  :: n
     type(yielding_t), intent(in)  :: points
     real(wp),         intent(in)  :: q(n_block), flow(n_block, 4)
     real(wp),         intent(out) :: first(n_block), da(n_block)
-    real(wp) :: g3, h, k, hi, modulus, modulus_left, residual, square, floor_strength, lowest
-    real(wp) :: strength, r, f, room, bb, bn, linear, rest, reach, over, under, left
-    real(wp) :: square_or_tiny, one_over_k, edge, no_bound, no_floor, softening, least
+    real(wp) :: g3, hi, k, modulus, modulus_left, floor_strength, lowest, strength, f, r
+    real(wp) :: one_over_k, no_floor, radius(n_block), room(n_block)
     integer  :: i
 
     g3 = 3.0_wp * material%shear_modulus
     hi = material%isotropic_modulus
-    h = max(0.0_wp, -material%kinematic_modulus)
     k = max(0.0_wp, -hi)
-    residual = material%residual_strength
-    floor_strength = merge(residual, -huge(1.0_wp), k > 0.0_wp)
+    floor_strength = merge(material%residual_strength, -huge(1.0_wp), k > 0.0_wp)
     modulus = g3 + material%kinematic_modulus + hi
     modulus_left = g3 + merge(max(0.0_wp, material%kinematic_modulus), hi, k > 0.0_wp)
-    square = h**2 - k**2
     one_over_k = 0.0_wp
     if (k > 0.0_wp) one_over_k = 1.0_wp / k
     no_floor = merge(0.0_wp, far, k > 0.0_wp)
-    square_or_tiny = merge(square, tiny_square, square > 0.0_wp)
-    softening = merge(max(h, k), far, max(h, k) > 0.0_wp)
-    no_bound = merge(0.0_wp, far, h > 0.0_wp)
-    edge = merge(no_bound, far, square > 0.0_wp)
-    !$omp simd simdlen(8) private(strength, r, f, room, bb, bn, linear, rest, reach, over, under) &
-    !$omp private(left, lowest, least)
+    !$omp simd simdlen(8) private(lowest, r)
+    do i = 1, n
+      lowest = min(floor_strength, points%yield_stress(i))
+      r = points%yield_stress(i) - k * points%alpha(i)
+      radius(i) = max(lowest, r) - min(material%residual_strength, points%yield_stress(i))
+      room(i) = radius(i) * one_over_k + no_floor
+    end do
+    if (material%kinematic_modulus < 0.0_wp) call end_at_bound(-material%kinematic_modulus, k, n, &
+      points, flow, radius, room)
+    !$omp simd simdlen(8) private(lowest, strength, f)
     do i = 1, n
       lowest = min(floor_strength, points%yield_stress(i))
       strength = max(lowest, points%yield_stress(i) + hi * points%alpha(i))
       f = max(0.0_wp, q(i) - strength)
-      r = points%yield_stress(i) - k * points%alpha(i)
-      r = max(lowest, r) - min(residual, points%yield_stress(i))
-      room = r * one_over_k + no_floor
+      da(i) = f / modulus
+      first(i) = min(da(i), room(i))
+      ! never beyond a straight path, for the modulus that is left is the larger one
+      da(i) = min(da(i), first(i) + max(0.0_wp, f - modulus * first(i)) / modulus_left)
+    end do
+  end subroutine increments
+
+  !> Shorten the room for plastic increments to where the back stress b - h da n, with
+  !> b = sqrt(3/2) beta and h = -H_k, meets its bound r - k da, k = -H_i, r = sigma_y - sigma_r
+  !> (sigma_y0 where H_i >= 0: the bound then stays; sigma_r is at most sigma_y0): the smallest
+  !> root da >= 0 of
+  !> (h^2 - k^2) da^2 - 2 (h b . n - r k) da - (r^2 - b . b) = 0, in the form that does not cancel.
+  !> Written without a branch: every quotient is finite, also where it is not used. They are kept
+  !> for a loop of their own, for what is computed only to be chosen becomes a branch.
+  pure subroutine end_at_bound(h, k, n, points, flow, radius, room)
+    real(wp),         intent(in)    :: h, k              !! h > 0, k >= 0 [Pa]
+    integer,          intent(in)    :: n
+    type(yielding_t), intent(in)    :: points
+    real(wp),         intent(in)    :: flow(n_block, 4)
+    real(wp),         intent(in)    :: radius(n_block)   !! r [Pa]
+    real(wp),         intent(inout) :: room(n_block)
+    real(wp) :: square, square_or_tiny, edge, bb, bn, rest, least, largest
+    real(wp) :: linear(n_block), reach(n_block), of_square(n_block), of_reach(n_block)
+    integer  :: i
+
+    square = h**2 - k**2
+    square_or_tiny = merge(square, tiny_square, square > 0.0_wp)
+    edge = merge(0.0_wp, far, square > 0.0_wp)
+    largest = max(h, k)
+    !$omp simd simdlen(8) private(bb, bn, rest, least)
+    do i = 1, n
       bb = 1.5_wp * (points%back_stress(i, 1)**2 + points%back_stress(i, 2)**2 &
         + points%back_stress(i, 3)**2 + 2.0_wp * points%back_stress(i, 4)**2)
       bn = root_3_2 * (points%back_stress(i, 1) * flow(i, 1) &
         + points%back_stress(i, 2) * flow(i, 2) + points%back_stress(i, 3) * flow(i, 3) &
         + 2.0_wp * points%back_stress(i, 4) * flow(i, 4))
-      rest = max(0.0_wp, r**2 - bb)
-      linear = h * bn - r * k
-      reach = sqrt(max(0.0_wp, linear**2 + square * rest)) + abs(linear)
-      ! linear > 0: reach / square, else rest / reach; 0 / 0: on the bound and about to leave it
-      over = merge(reach, rest, linear > 0.0_wp)
+      rest = max(0.0_wp, radius(i)**2 - bb)
+      linear(i) = h * bn - radius(i) * k
+      reach(i) = sqrt(max(0.0_wp, linear(i)**2 + square * rest)) + abs(linear(i))
       ! small beside the products of stresses in `reach`, in whatever unit
-      least = tiny_square * min(1.0_wp, softening * points%yield_stress(i))
-      under = merge(square_or_tiny, max(reach, least), linear > 0.0_wp)
-      room = min(room, over / under + merge(no_bound, edge, reach > 0.0_wp))
-      da(i) = f / modulus
-      first(i) = min(da(i), room)
-      f = f - modulus * first(i)
-      left = f / modulus_left
-      da(i) = merge(first(i) + left, da(i), first(i) < da(i))
+      least = tiny_square * min(1.0_wp, largest * points%yield_stress(i))
+      of_square(i) = reach(i) / square_or_tiny
+      of_reach(i) = rest / max(reach(i), least)
     end do
-  end subroutine increments
+    ! 0 / 0: on the bound and about to leave it
+    !$omp simd simdlen(8)
+    do i = 1, n
+      room(i) = min(room(i), merge(of_square(i), of_reach(i), linear(i) > 0.0_wp) &
+        + merge(0.0_wp, edge, reach(i) > 0.0_wp))
+    end do
+  end subroutine end_at_bound
 
   !> beta <- beta + sqrt(2/3) H_k da n: `first` where kinematic softening ends, else all of da.
   pure subroutine move_back_stress(material, n, flow, first, da, points)

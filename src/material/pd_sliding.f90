@@ -1,38 +1,45 @@
 !> The rest of a return to the yield surface when the back stress has met its bound: it slides.
 !>
-!> Everything here lies in the plane of two tensors, so that one scalar equation is left.
+!> Everything here lies in the plane of two tensors, so that one scalar equation is left. It is
+!> solved for all points of a block at a time: loops without a branch hold the arithmetic, and a
+!> point that has its answer stays as it is while others go on.
 !> Source: doc/theory.md, section 3.
 module pd_sliding
-  use pd_kinds, only: wp
-  use pd_tensors, only: inner, norm
+  use pd_kinds, only: n_block, wp
   implicit none
   private
 
-  public :: bound_t, slide
+  public :: sliding_t, slide
 
-  !> A point whose back stress has met its bound.
-  type :: bound_t
-    real(wp) :: g3         !! 3 G [Pa]
-    real(wp) :: h          !! |H_k|, H_k < 0 [Pa]
-    real(wp) :: hi         !! H_i [Pa]
-    real(wp) :: strength   !! sigma_y1 [Pa]
-    real(wp) :: radius     !! R1; where H_i < 0 it falls with sigma_y [Pa]
-  end type bound_t
+  !> Points of a block whose back stress has met its bound.
+  type :: sliding_t
+    integer  :: n = 0                 !! points
+    real(wp) :: g3, h, hi             !! 3 G, |H_k| with H_k < 0, H_i [Pa]
+    real(wp) :: strength(n_block)     !! sigma_y1 [Pa]
+    real(wp) :: radius(n_block)       !! R1; where H_i < 0 it falls with sigma_y [Pa]
+    real(wp) :: q(n_block)            !! sqrt(3/2)|eta| before the rest [Pa]
+    real(wp) :: flow(n_block, 4)      !! flow direction n, |n| = 1; xx yy zz xy
+    real(wp) :: beta(n_block, 4)      !! back stress [Pa]
+    real(wp) :: da(n_block)           !! plastic increment of the rest; in: that of a straight path
+  end type sliding_t
 
-  !> a = sqrt(3/2) dev S and b = sqrt(3/2) beta before the rest, as scalars.
-  type :: plane_t
-    real(wp) :: aa, ab, bb   !! a . a, a . b, b . b [Pa^2]
-  end type plane_t
+  !> a = sqrt(3/2) dev S and b = sqrt(3/2) beta before the rest, and their products.
+  type :: planes_t
+    real(wp) :: a(n_block, 4), b(n_block, 4)                    !! [Pa]
+    real(wp) :: aa(n_block), ab(n_block), bb(n_block)           !! a . a, a . b, b . b [Pa^2]
+    logical  :: solved(n_block)                                 !! the answer needs no search
+  end type planes_t
 
-  !> A trial value t of R / |b - h da n|, and what follows from it.
-  type :: trial_t
-    real(wp) :: da           !! plastic increment
-    real(wp) :: length       !! |a - t b| [Pa]
-    real(wp) :: distance     !! |b - h da n| [Pa]
-    real(wp) :: radius       !! R at the end [Pa]
-    real(wp) :: excess       !! t |b - h da n| - R: zero at the answer [Pa]
-    real(wp) :: slope        !! of the excess with t [Pa]
-  end type trial_t
+  !> Trial values t of R / |b - h da n|, and what follows from them.
+  type :: trials_t
+    real(wp) :: t(n_block)
+    real(wp) :: da(n_block)           !! plastic increment
+    real(wp) :: length(n_block)       !! |a - t b| [Pa]
+    real(wp) :: distance(n_block)     !! |b - h da n| [Pa]
+    real(wp) :: radius(n_block)       !! R at the end [Pa]
+    real(wp) :: excess(n_block)       !! t |b - h da n| - R: zero at the answer [Pa]
+    real(wp) :: slope(n_block)        !! of the excess with t [Pa]
+  end type trials_t
 
   !> |b - (b : n) n| / |b| below which the path counts as straight: the answer is then known.
   real(wp), parameter :: straight = 1.0e-12_wp
@@ -48,69 +55,139 @@ contains
   !>   b' = b - h da n, moved back along itself to |b'| <= R,   e' = a - 3 G da n - b' = sigma_y n
   !>
   !> Errors: none: there is exactly one answer (doc/theory.md), and it is bracketed.
-  pure subroutine slide(bound, q, n, beta, da)
-    type(bound_t), intent(in)    :: bound
-    real(wp),      intent(in)    :: q         !! sqrt(3/2)|eta| before the rest [Pa]
-    real(wp),      intent(inout) :: n(4)      !! flow direction, |n| = 1
-    real(wp),      intent(inout) :: beta(4)   !! back stress [Pa]
-    real(wp),      intent(inout) :: da        !! in: that of a straight path
-    real(wp) :: a(4), b(4), bn, t, shrinking, residual
-    logical  :: is_straight
-    type(plane_t) :: plane
-    type(trial_t) :: end
+  pure subroutine slide(points)
+    type(sliding_t), intent(inout) :: points
+    type(planes_t) :: planes
+    type(trials_t) :: trials
+    real(wp) :: part(n_block)
+    integer  :: i, c
 
-    shrinking = max(0.0_wp, -bound%hi)
-    b = root_3_2 * beta
-    bn = inner(b, n)
-    is_straight = bn <= 0.0_wp .and. norm(b - bn * n) <= straight * norm(b)
-    if (is_straight .or. bound%radius <= 0.0_wp) then
-      if (shrinking > 0.0_wp) beta = beta &
-        * max(0.0_wp, 1.0_wp - shrinking * da / max(bound%radius, least))
-      return
-    end if
-    a = q * n + b
-    residual = bound%strength - bound%radius
-    if (shrinking * (norm(a) - residual) >= bound%g3 * bound%radius) then   ! R ends at zero
-      beta = 0.0_wp
-      n = a / norm(a)
-      da = (norm(a) - residual) / bound%g3
-      return
-    end if
-    plane = plane_t(inner(a, a), inner(a, b), inner(b, b))
-    call solve(bound, plane, t, end)
-    n = (a - t * b) / end%length
-    da = end%da
-    beta = root_2_3 * min(1.0_wp, end%radius / end%distance) &
-      * (b - bound%h * da * n)
+    call find_planes(points, planes)
+    do i = 1, points%n
+      call try_known_answers(i, planes, points)
+    end do
+    if (all(planes%solved(:points%n))) return
+    call solve(points, planes, trials)
+    !$omp simd simdlen(8)
+    do i = 1, points%n
+      part(i) = root_2_3 * min(1.0_wp, trials%radius(i) / trials%distance(i))
+    end do
+    do c = 1, 4
+      do i = 1, points%n
+        if (planes%solved(i)) cycle
+        points%flow(i, c) = (planes%a(i, c) - trials%t(i) * planes%b(i, c)) / trials%length(i)
+        points%beta(i, c) = part(i) &
+          * (planes%b(i, c) - points%h * trials%da(i) * points%flow(i, c))
+      end do
+    end do
+    do i = 1, points%n
+      if (.not. planes%solved(i)) points%da(i) = trials%da(i)
+    end do
   end subroutine slide
 
-  !> The root of the excess, which grows with t, in 0 < t <= 1: Newton's steps within a bracket.
-  pure subroutine solve(bound, plane, t, end)
-    type(bound_t), intent(in)  :: bound
-    type(plane_t), intent(in)  :: plane
-    real(wp),      intent(out) :: t
-    type(trial_t), intent(out) :: end
-    real(wp) :: low, high, next
-    logical  :: last
-    integer  :: k
+  !> a, b and their products.
+  pure subroutine find_planes(points, planes)
+    type(sliding_t), intent(in)  :: points
+    type(planes_t),  intent(out) :: planes
+    integer :: i, c
+
+    do c = 1, 4
+      !$omp simd simdlen(8)
+      do i = 1, points%n
+        planes%b(i, c) = root_3_2 * points%beta(i, c)
+        planes%a(i, c) = points%q(i) * points%flow(i, c) + planes%b(i, c)
+      end do
+    end do
+    call inner_products(points%n, planes%a, planes%a, planes%aa)
+    call inner_products(points%n, planes%a, planes%b, planes%ab)
+    call inner_products(points%n, planes%b, planes%b, planes%bb)
+  end subroutine find_planes
+
+  !> a : b of symmetric tensors.
+  pure subroutine inner_products(n, a, b, ab)
+    integer,  intent(in)  :: n
+    real(wp), intent(in)  :: a(n_block, 4), b(n_block, 4)
+    real(wp), intent(out) :: ab(n_block)
+    integer :: i
+
+    !$omp simd simdlen(8)
+    do i = 1, n
+      ab(i) = a(i, 1) * b(i, 1) + a(i, 2) * b(i, 2) + a(i, 3) * b(i, 3) &
+        + 2.0_wp * a(i, 4) * b(i, 4)
+    end do
+  end subroutine inner_products
+
+  !> A straight path, on which flow goes on as it was, and a bound that shrinks to nothing.
+  pure subroutine try_known_answers(i, planes, points)
+    integer,         intent(in)    :: i
+    type(planes_t),  intent(inout) :: planes
+    type(sliding_t), intent(inout) :: points
+    real(wp) :: bn, across(4), length, shrinking, residual
+
+    shrinking = max(0.0_wp, -points%hi)
+    associate (n => points%flow(i, :), b => planes%b(i, :), radius => points%radius(i))
+      planes%solved(i) = radius <= 0.0_wp
+      bn = b(1) * n(1) + b(2) * n(2) + b(3) * n(3) + 2.0_wp * b(4) * n(4)
+      if (bn <= 0.0_wp) then
+        across = b - bn * n
+        if (across(1)**2 + across(2)**2 + across(3)**2 + 2.0_wp * across(4)**2 &
+          <= straight**2 * planes%bb(i)) planes%solved(i) = .true.
+      end if
+      if (planes%solved(i)) then
+        if (shrinking > 0.0_wp) points%beta(i, :) = points%beta(i, :) &
+          * max(0.0_wp, 1.0_wp - shrinking * points%da(i) / max(radius, least))
+        return
+      end if
+      residual = points%strength(i) - radius
+      length = sqrt(planes%aa(i))
+      if (shrinking * (length - residual) >= points%g3 * radius) then   ! R ends at zero
+        points%beta(i, :) = 0.0_wp
+        points%flow(i, :) = planes%a(i, :) / length
+        points%da(i) = (length - residual) / points%g3
+        planes%solved(i) = .true.
+      end if
+    end associate
+  end subroutine try_known_answers
+
+  !> The roots of the excess, which grows with t, in 0 < t <= 1: Newton's steps within brackets.
+  pure subroutine solve(points, planes, trials)
+    type(sliding_t), intent(in)  :: points
+    type(planes_t),  intent(in)  :: planes
+    type(trials_t),  intent(out) :: trials
+    real(wp) :: low(n_block), high(n_block), step(n_block), next
+    logical  :: goes_on(n_block), last(n_block)
+    integer  :: i, k
 
     low = 0.0_wp
     high = 1.0_wp
-    t = 1.0_wp
-    end = at(bound, plane, t)
-    if (end%excess <= 0.0_wp) return   ! but for round-off, the back stress was not going to leave
+    trials%t = 1.0_wp
+    last = .false.
+    call evaluate(points, planes, trials)
+    do i = 1, points%n   ! not above zero: but for round-off, the back stress was not going to leave
+      goes_on(i) = trials%excess(i) > 0.0_wp .and. .not. planes%solved(i)
+    end do
     do k = 1, most_trials
-      next = t - end%excess / max(end%slope, least)
-      last = abs(next - t) <= close * t
-      if (.not. (next >= low .and. next <= high)) then
-        next = 0.5_wp * (low + high)
-        last = high - low <= epsilon(1.0_wp) * high
-      end if
-      t = next
-      end = at(bound, plane, t)
-      if (last) return
-      if (end%excess > 0.0_wp) high = t
-      if (end%excess <= 0.0_wp) low = t
+      if (.not. any(goes_on(:points%n))) return
+      !$omp simd simdlen(8)
+      do i = 1, points%n
+        step(i) = trials%excess(i) / max(trials%slope(i), least)
+      end do
+      do i = 1, points%n
+        if (.not. goes_on(i)) cycle
+        next = trials%t(i) - step(i)
+        last(i) = abs(next - trials%t(i)) <= close * trials%t(i)
+        if (.not. (next >= low(i) .and. next <= high(i))) then
+          next = 0.5_wp * (low(i) + high(i))
+          last(i) = high(i) - low(i) <= epsilon(1.0_wp) * high(i)
+        end if
+        trials%t(i) = next
+      end do
+      call evaluate(points, planes, trials)
+      do i = 1, points%n
+        if (trials%excess(i) > 0.0_wp) high(i) = trials%t(i)
+        if (trials%excess(i) <= 0.0_wp) low(i) = trials%t(i)
+        goes_on(i) = goes_on(i) .and. .not. last(i)
+      end do
     end do
   end subroutine solve
 
@@ -118,26 +195,32 @@ contains
   !>
   !>   n = (a - t b) / |a - t b|,  da = (|a - t b| - sigma_y1) / M,  da' = w / M
   !>   excess' = |b - h da n| + t h (w da' + da |b - (b . n) n|^2 / |a - t b|) / |b - h da n| - R'
-  pure type(trial_t) function at(bound, plane, t) result(trial)
-    type(bound_t), intent(in) :: bound
-    type(plane_t), intent(in) :: plane
-    real(wp),      intent(in) :: t
-    real(wp) :: over_modulus, over_length, bn, w, rate, shrinking, way
+  pure subroutine evaluate(points, planes, trials)
+    type(sliding_t), intent(in)    :: points
+    type(planes_t),  intent(in)    :: planes
+    type(trials_t),  intent(inout) :: trials   !! t is given
+    real(wp) :: over_modulus, over_length, bn, w, rate, shrinking, way, t
+    integer  :: i
 
-    shrinking = max(0.0_wp, -bound%hi)
-    over_modulus = 1.0_wp / (bound%g3 + bound%hi - bound%h * t)
-    trial%length = sqrt(max(0.0_wp, plane%aa - 2.0_wp * t * plane%ab + t**2 * plane%bb))
-    over_length = 1.0_wp / max(trial%length, least)
-    trial%da = max(0.0_wp, (trial%length - bound%strength) * over_modulus)
-    bn = (plane%ab - t * plane%bb) * over_length
-    way = bound%h * trial%da
-    trial%distance = sqrt(max(least, plane%bb + way * (way - 2.0_wp * bn)))
-    trial%radius = max(0.0_wp, bound%radius - shrinking * trial%da)
-    trial%excess = t * trial%distance - trial%radius
-    w = way - bn
-    rate = w * over_modulus
-    trial%slope = trial%distance + shrinking * rate + t * bound%h * (w * rate + trial%da &
-      * max(0.0_wp, plane%bb - bn**2) * over_length) / trial%distance
-  end function at
+    shrinking = max(0.0_wp, -points%hi)
+    !$omp simd simdlen(8) private(over_modulus, over_length, bn, w, rate, way, t)
+    do i = 1, points%n
+      t = trials%t(i)
+      over_modulus = 1.0_wp / (points%g3 + points%hi - points%h * t)
+      trials%length(i) = sqrt(max(0.0_wp, planes%aa(i) - 2.0_wp * t * planes%ab(i) &
+        + t**2 * planes%bb(i)))
+      over_length = 1.0_wp / max(trials%length(i), least)
+      trials%da(i) = max(0.0_wp, (trials%length(i) - points%strength(i)) * over_modulus)
+      bn = (planes%ab(i) - t * planes%bb(i)) * over_length
+      way = points%h * trials%da(i)
+      trials%distance(i) = sqrt(max(least, planes%bb(i) + way * (way - 2.0_wp * bn)))
+      trials%radius(i) = max(0.0_wp, points%radius(i) - shrinking * trials%da(i))
+      trials%excess(i) = t * trials%distance(i) - trials%radius(i)
+      w = way - bn
+      rate = w * over_modulus
+      trials%slope(i) = trials%distance(i) + shrinking * rate + t * points%h * (w * rate &
+        + trials%da(i) * max(0.0_wp, planes%bb(i) - bn**2) * over_length) / trials%distance(i)
+    end do
+  end subroutine evaluate
 
 end module pd_sliding
