@@ -14,6 +14,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
+import h5py
 import numpy as np
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -110,6 +111,46 @@ def lattice_case(
     path = folder / f"{name}.nml"
     path.write_text(text + (more or PLAIN))
     return run(path, folder, name, threads, program)
+
+
+def flowing_case(columns: int, rows: int, m: int, steps: int) -> dict[str, float]:
+    """The last steps of a specimen of which every point flows: two runs, and the difference.
+
+    Both ends move towards each other. The yield stress is so small that points flow as soon as the
+    waves from the ends have passed, and the material hardens, so that they do not cease to.
+    """
+    name = f"flowing_{columns}x{rows}"
+    folder = RESULTS / name
+    folder.mkdir(parents=True, exist_ok=True)
+    dx = 1.0 / (columns - 1)
+    dt = 2.4 * dx / C_P
+    runs = []
+    for count in (rows // 3, rows // 3 + steps):
+        text = INPUT.format(
+            name=name,
+            folder=folder,
+            operators="lattice",
+            dx=repr(dx),
+            delta=repr(m * dx),
+            width=1.0,
+            height=repr((rows - 1) * dx),
+            end=repr(count * dt),
+            dt=repr(dt),
+            rows=2,
+        )
+        text = re.sub(
+            r"yield_stress = .*", "yield_stress = 1.0, kinematic_modulus = 1.5e6 /", text, count=1
+        ).replace("side = 'bottom'", "side = 'bottom', velocity = 0.0, 0.01")
+        path = folder / f"{name}.nml"
+        path.write_text(text + PLAIN)
+        runs.append(run(path, folder, name, 1))
+    with h5py.File(folder / f"{name}.h5", locking=False) as file:
+        last = file["frames"][sorted(file["frames"])[-1]]
+        if not (last["plastic_strain"][()] > 0.0).all():
+            sys.exit(f"bench: not every point of {name} flows")
+    early, late = runs
+    differences = {key: late[key] - early[key] for key in ("loop", "steps", *KERNELS)}
+    return {**late, **differences}
 
 
 def set_up_seconds(side: int, m: int, threads: int) -> float:
