@@ -64,7 +64,7 @@ def run(
         "loop": float(re.findall(r"time loop\s+(\S+) s", log)[-1]),
         "steps": float(re.findall(r"time loop.*steps (\d+)", log)[-1]),
         "points": float(re.findall(r"points\s+(\d+),", log)[-1]),
-        "bonds": float(re.findall(r"bonds\s+([0-9.E+]+);", log)[-1]),
+        "bonds": float(re.findall(r"bonds\s+([0-9.eE+-]+);", log)[-1]),
         "memory": 1024.0 * usage.ru_maxrss,
         "threads": float(threads),
     }
