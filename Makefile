@@ -58,7 +58,7 @@ build    := build/$(BUILD)$(if $(MPI),-mpi)
 studies := fig3a fig3b fig4 fig5 seeds horizon loading size softening influence heterogeneity \
   zero_energy equilibrium
 .PHONY: all program objects post debug units demo demo-quick test lint verify \
-  layers setup install help clean distclean figures $(studies) \
+  layers setup install uninstall wheel help clean distclean figures $(studies) \
   report report-view site bench clouds finite_elements limit_loads
 .DEFAULT_GOAL := all
 
@@ -159,9 +159,20 @@ bench:             ## measure the speed on this machine; PUBLISH=1: into doc/per
 	@$(submake) $(parallel) ALIGNED=0 build=build/unaligned program=build/unaligned/perigeo program
 	@$(venv)/bin/python tests/bench/bench.py $(if $(PUBLISH),--publish)
 
-install: program   ## copy the program to PREFIX/bin (PREFIX=/usr/local)
-	mkdir -p '$(DESTDIR)$(PREFIX)/bin'
-	cp $(program) '$(DESTDIR)$(PREFIX)/bin/'
+to_prefix = PREFIX='$(PREFIX)' DESTDIR='$(DESTDIR)' PYTHON='$(PYTHON)' POST='$(POST)' \
+  sh tools/install.sh
+
+install: program   ## program, perigeo-post, inputs, man pages, completion: PREFIX=/usr/local
+	@$(to_prefix) install $(program)
+
+uninstall:         ## take away what make install has put into PREFIX
+	@$(to_prefix) uninstall
+
+wheel:             ## perigeo-post as a wheel, in build/wheel
+	@sh tools/python_env.sh run
+	@$(venv)/bin/python -m pip wheel --quiet --disable-pip-version-check --no-deps \
+	  --wheel-dir build/wheel ./postproc
+	@ls build/wheel/*.whl
 
 clean:             ## remove what was built; keeps .venv and results
 	rm -rf build bin
@@ -180,16 +191,18 @@ help:              ## list the targets
 	@echo '  ALIGNED=0         arrays begin where malloc puts them, not at a line of the cache'
 	@echo '  PFUNIT_DIR=DIR    with make test: use the pFUnit installed in DIR'
 	@echo '  NO_INSTALL=1      never install anything'
+	@echo '  PREFIX=, DESTDIR= with make install: where to (/usr/local), and what stands before it'
+	@echo '  PYTHON=, POST=0   with make install: the Python of perigeo-post; without perigeo-post'
 	@echo '  V=1               show the commands'
 
 # ---------------------------------------------------------------------------------- compiling
 # The rest needs the compiler and HDF5, which `make demo` may have to install first.
-ifneq ($(filter-out setup demo demo-quick test debug lint verify layers help clean \
+ifneq ($(filter-out setup uninstall wheel demo demo-quick test debug lint verify layers help clean \
   distclean figures $(studies) report report-view site bench clouds finite_elements limit_loads,\
   $(or $(MAKECMDGOALS),all)),)
 
 ifeq ($(shell command -v $(firstword $(FC)) 2>/dev/null),)
-  $(error no Fortran compiler ($(FC)): run tools/setup.sh, which installs or names what is missing)
+  $(error no Fortran compiler ($(FC)): `make setup` installs or names what is missing)
 endif
 # Not every gfortran knows the processor it runs on.
 ifeq ($(MARCH),native)
@@ -207,7 +220,7 @@ endif
 hdf5_compile := $(shell H5FC='$(H5FC)' sh tools/hdf5_flags.sh compile '$(FC)')
 hdf5_link    := $(shell H5FC='$(H5FC)' sh tools/hdf5_flags.sh link '$(FC)')
 ifeq ($(hdf5_link),)
-  $(error no HDF5 library for Fortran: run tools/setup.sh, which installs or names what is missing)
+  $(error no HDF5 library for Fortran: `make setup` installs or names what is missing)
 endif
 
 # Arrays at the start of a cache line (src/system/pd_memory.f90), where linker and C library can

@@ -21,6 +21,49 @@ module pd_command_line
     logical :: json = .false., print_input = .false., doubts = .false.
   end type options_t
 
+  !> What --help prints, and the only list of the options: a line that begins with them names them.
+  character(*), parameter :: help_text(*) = [character(96) :: &
+    'perigeo: peridynamics for geomaterials. Shows where soil fails: plane strain,', &
+    'J2 plasticity with softening, non-ordinary state-based peridynamics.', &
+    '', &
+    'usage: perigeo [options] RUN.nml', &
+    '', &
+    '  RUN.nml             the input file, Fortran namelists: see doc/input.md and input/', &
+    '', &
+    'A value may stand behind its option or behind an =: --threads 2, --threads=2.', &
+    '', &
+    '  --check             check the input and print the derived figures; run nothing', &
+    '  --points FILE       with --check: write points, boundaries and loads to a file;', &
+    '                      perigeo-post geometry RUN.nml draws them', &
+    '  --output DIR        folder for the results (default: output_dir of the input file,', &
+    '                      or results/<name>)', &
+    '  --threads N         number of threads (default: OMP_NUM_THREADS, or all cores)', &
+    '  --restart           go on from the newest checkpoint in the output folder', &
+    '  --force             overwrite the results of an earlier run', &
+    '  --quiet             no progress on the screen; errors still appear', &
+    '  --set GROUP.KEY=VALUE', &
+    '                      a value in place of that of the input file, as often as needed:', &
+    '                      material.density=1800, boundary.top.velocity=0,-0.02; nothing', &
+    '                      behind the = takes a key or a group out', &
+    '  --print-input       print an input file with all values as used; run nothing', &
+    '  --input-reference   print the tables of all input keys (see doc/input.md)', &
+    '  --json              with --input-reference: for programs', &
+    '  --doubts            print the table of what a run is warned of (see doc/doubts.md)', &
+    '  --version, --help', &
+    '', &
+    'Results, in the output folder: <name>_history.csv (curves), <name>.h5 (fields),', &
+    '<name>.xdmf (open this in ParaView), <name>.log. Figures: perigeo-post --help', &
+    '', &
+    'A first run, in the folder of perigeo (once installed: PREFIX/share/perigeo):', &
+    '  perigeo input/compression_quick.nml --output ~/results/quick', &
+    '  perigeo-post contours ~/results/quick/compression_quick.h5', &
+    '', &
+    'Ctrl-C (or SIGTERM, SIGUSR1) writes a checkpoint and stops; --restart goes on from there.', &
+    '', &
+    'exit status: 0 finished; 1 wrong command line; 2 wrong input file; 3 the model cannot be', &
+    '  set up; 4 the calculation failed; 5 a file cannot be written or read (also: results of', &
+    '  an earlier run in the way, no checkpoint to restart from); 130, 143 stopped by a signal']
+
 contains
 
   !> Read the options.
@@ -30,7 +73,7 @@ contains
   subroutine read_command_line(options, errors)
     type(options_t),    intent(out)   :: options
     type(error_list_t), intent(inout) :: errors
-    character(:), allocatable :: word
+    character(:), allocatable :: word, given   ! given: a value behind =, until it is taken
     integer :: i
 
     options%input_path = ''
@@ -45,6 +88,7 @@ contains
         call take_input_path(word, options, errors)
         cycle
       end if
+      call take_apart(word, given)
       select case (word)
       case ('--check')
         options%check = .true.
@@ -77,20 +121,27 @@ contains
         call read_threads(options%threads)
       case default
         call report_unknown(word, errors)
+        cycle
       end select
+      if (allocated(given)) call errors%add('the option takes no value', word, '"'//given//'"')
     end do
     call check_together(options, errors)
 
   contains
 
-    !> The argument that follows an option.
+    !> The argument that follows an option, or the value behind its =.
     subroutine value_of(option, meaning, value)
       character(*),              intent(in)    :: option, meaning
       character(:), allocatable, intent(inout) :: value
 
-      i = i + 1
-      value = ''
-      if (i <= command_argument_count()) value = argument(i)
+      if (allocated(given)) then
+        value = given
+        deallocate (given)
+      else
+        i = i + 1
+        value = ''
+        if (i <= command_argument_count()) value = argument(i)
+      end if
       if (value == '' .or. index(value, '--') == 1) &
         call errors%add('a value is missing', option, '"'//value//'"', meaning)
     end subroutine value_of
@@ -113,6 +164,18 @@ contains
     end subroutine read_threads
 
   end subroutine read_command_line
+
+  !> An option and the value behind its =, if there is one: --threads=2.
+  subroutine take_apart(word, value)
+    character(:), allocatable, intent(inout) :: word
+    character(:), allocatable, intent(out)   :: value
+    integer :: equals
+
+    equals = index(word, '=')
+    if (index(word, '--') /= 1 .or. equals == 0) return
+    value = word(equals + 1:)
+    word = word(:equals - 1)
+  end subroutine take_apart
 
   !> A word that is no option is the input file.
   subroutine take_input_path(word, options, errors)
@@ -163,15 +226,30 @@ contains
   subroutine report_unknown(word, errors)
     character(*),       intent(in)    :: word
     type(error_list_t), intent(inout) :: errors
-    character(17), parameter :: known(14) = [character(17) :: '--check', '--output', '--threads', &
-      '--restart', '--force', '--quiet', '--version', '--help', '--input-reference', '--json', &
-      '--set', '--print-input', '--points', '--doubts']
     character(:), allocatable :: near
 
-    near = nearest_name(word, known)
+    near = nearest_name(word, known_options())
     if (near /= '') near = '; did you mean '//near//'?'
     call errors%add('unknown option '//word//near)
   end subroutine report_unknown
+
+  !> All options: the words of the help that begin with -- where a line begins with one.
+  pure function known_options() result(known)
+    character(17), allocatable :: known(:)
+    character(17) :: name
+    integer :: i, from
+
+    allocate (known(0))
+    do i = 1, size(help_text)
+      if (index(help_text(i), '  --') /= 1) cycle
+      from = 3
+      do while (index(help_text(i)(from:), '--') == 1)
+        name = help_text(i)(from:from + scan(help_text(i)(from:), ' ,') - 2)
+        known = [known, name]
+        from = from + len_trim(name) + 2   ! behind a comma and a blank
+      end do
+    end do
+  end function known_options
 
   !> Argument i in its whole length.
   function argument(i) result(word)
@@ -186,49 +264,10 @@ contains
 
   !> The text of --help.
   subroutine print_help()
-    character(*), parameter :: text(*) = [character(96) :: &
-      'perigeo: peridynamics for geomaterials. Shows where soil fails: plane strain,', &
-      'J2 plasticity with softening, non-ordinary state-based peridynamics.', &
-      '', &
-      'usage: perigeo [options] RUN.nml', &
-      '', &
-      '  RUN.nml             the input file, Fortran namelists: see doc/input.md and input/', &
-      '', &
-      '  --check             check the input and print the derived figures; run nothing', &
-      '  --points FILE       with --check: write points, boundaries and loads to a file;', &
-      '                      perigeo-post geometry RUN.nml draws them', &
-      '  --output DIR        folder for the results (default: output_dir of the input file,', &
-      '                      or results/<name>)', &
-      '  --threads N         number of threads (default: OMP_NUM_THREADS, or all cores)', &
-      '  --restart           go on from the newest checkpoint in the output folder', &
-      '  --force             overwrite the results of an earlier run', &
-      '  --quiet             no progress on the screen; errors still appear', &
-      '  --set GROUP.KEY=VALUE', &
-      '                      a value in place of that of the input file, as often as needed:', &
-      '                      material.density=1800, boundary.top.velocity=0,-0.02; nothing', &
-      '                      behind the = takes a key or a group out', &
-      '  --print-input       print an input file with all values as used; run nothing', &
-      '  --input-reference   print the tables of all input keys (see doc/input.md); with', &
-      '                      --json for programs', &
-      '  --doubts            print the table of what a run is warned of (see doc/doubts.md)', &
-      '  --version, --help', &
-      '', &
-      'Results, in the output folder: <name>_history.csv (curves), <name>.h5 (fields),', &
-      '<name>.xdmf (open this in ParaView), <name>.log. Figures: perigeo-post --help', &
-      '', &
-      'A first run:', &
-      '  bin/perigeo input/compression_quick.nml', &
-      '  .venv/bin/perigeo-post contours results/compression_quick/compression_quick.h5', &
-      '', &
-      'Ctrl-C (or SIGTERM, SIGUSR1) writes a checkpoint and stops; --restart goes on from there.', &
-      '', &
-      'exit status: 0 finished; 1 wrong command line; 2 wrong input file; 3 the model cannot be', &
-      '  set up; 4 the calculation failed; 5 a file cannot be written or read (also: results of', &
-      '  an earlier run in the way, no checkpoint to restart from); 130, 143 stopped by a signal']
     integer :: i
 
-    do i = 1, size(text)
-      write (output_unit, '(a)') trim(text(i))
+    do i = 1, size(help_text)
+      write (output_unit, '(a)') trim(help_text(i))
     end do
   end subroutine print_help
 

@@ -78,6 +78,10 @@ def test_a_check_runs_nothing(run_case, tmp_path):
         (["--threads", "two", "run.nml"], "number of threads is wrong"),
         (["--threads"], "--threads: a value is missing"),
         (["run.nml", "--output"], "--output: a value is missing"),
+        (["run.nml", "--output="], "--output: a value is missing"),
+        (["--threads=two", "run.nml"], "number of threads is wrong"),
+        (["--check=yes", "run.nml"], "--check: the option takes no value"),
+        (["--thread=2", "run.nml"], "unknown option --thread; did you mean --threads?"),
     ],
 )
 def test_a_wrong_command_line_is_status_1(perigeo, tmp_path, arguments, message):
@@ -86,6 +90,17 @@ def test_a_wrong_command_line_is_status_1(perigeo, tmp_path, arguments, message)
     assert done.returncode == 1
     assert message in done.stderr
     assert list(contents(tmp_path)) == ["run.nml"]
+
+
+def test_a_value_may_stand_behind_an_equals_sign(perigeo, tmp_path):
+    (tmp_path / "run.nml").write_text(SPECIMEN)
+    options = ["--threads=1", "--output=there", "--set=run.title='a = b'", "--quiet"]
+    done = perigeo([*options, "run.nml"], tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "title               a = b" in (tmp_path / "there" / "case.log").read_text()
+    done = perigeo(["--check", "--points=points.txt", "run.nml"], tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "points.txt").is_file()
 
 
 # ------------------------------------------------------------------------------ 2 and 3

@@ -1,0 +1,1 @@
+"""Measure what a result holds: curves, moduli, shear bands, quality."""

@@ -1,0 +1,1 @@
+"""Put all studies on one page and publish its tables."""

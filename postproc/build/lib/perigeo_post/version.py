@@ -1,0 +1,3 @@
+"""The version of perigeo-post."""
+
+__version__ = "0.1.0"

@@ -1,0 +1,176 @@
+"""make install: into an empty folder, used without the repository, taken away again."""
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from conftest import ROOT
+
+
+def install(action, prefix, program, **settings):
+    """Call tools/install.sh; return what it says."""
+    done = subprocess.run(
+        ["sh", str(ROOT / "tools/install.sh"), action, str(program)],
+        env={**os.environ, "PYTHON": sys.executable, **settings, "PREFIX": str(prefix)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stderr == ""
+    return done.stdout
+
+
+def files(folder):
+    """Return all files below a folder, by name."""
+    return sorted(str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file())
+
+
+@pytest.fixture(scope="module")
+def prefix(program, tmp_path_factory):
+    """Return a folder in which perigeo is installed."""
+    if program.name != "perigeo":
+        pytest.skip("the program with all checks is not installed")
+    folder = tmp_path_factory.mktemp("installed") / "with a blank"
+    install("install", folder, program)
+    return folder
+
+
+@pytest.fixture
+def use(prefix, tmp_path):
+    """Return a function that runs an installed command in a folder far from the repository."""
+    shutil.copytree(prefix / "share/perigeo/input", tmp_path / "input")
+
+    def run(*words):
+        path = os.pathsep.join([str(prefix / "bin"), "/usr/bin", "/bin"])
+        return subprocess.run(
+            [str(prefix / "bin" / words[0]), *words[1:]],
+            cwd=tmp_path,
+            env={"PATH": path, "HOME": str(tmp_path), "OMP_NUM_THREADS": "1"},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+
+    return run
+
+
+def test_a_run_and_a_figure_far_from_the_repository(use, prefix, tmp_path):
+    done = use("perigeo", "--quiet", "input/biaxial_isotropic.nml")
+    assert done.returncode == 0, done.stderr
+    result = "results/biaxial_isotropic/biaxial_isotropic.h5"
+    done = use("perigeo-post", "curves", result, "-o", "curve.png")
+    assert done.returncode == 0, done.stderr
+    assert (tmp_path / "curve.png").read_bytes().startswith(b"\x89PNG")
+    study = prefix / "share/perigeo/studies/fig3a.toml"
+    done = use("perigeo-post", "study", str(study), "--dry-run")
+    assert done.returncode == 0, done.stderr
+    launcher = (prefix / "bin/perigeo-post").read_text()
+    assert str(ROOT / "postproc") not in launcher
+
+
+def test_all_that_belongs_to_it_is_there(prefix):
+    there = set(files(prefix))
+    for name in (
+        "bin/perigeo",
+        "bin/perigeo-post",
+        "share/perigeo/LICENSE",
+        "share/perigeo/input/limit_loads/slope.nml",
+        "share/perigeo/studies/fig5.toml",
+        "share/perigeo/doc/input.md",
+        "share/man/man1/perigeo.1",
+        "share/man/man1/perigeo-post.1",
+        "share/zsh/site-functions/_perigeo",
+        "share/fish/vendor_completions.d/perigeo-post.fish",
+    ):
+        assert name in there, name
+
+
+def test_pages_say_what_help_says(prefix, perigeo, tmp_path):
+    page = (prefix / "share/man/man1/perigeo.1").read_text().replace("\\-", "-")
+    words = perigeo(["--help"], tmp_path).stdout
+    options = [line.split()[0].rstrip(",") for line in words.splitlines() if line[:4] == "  --"]
+    assert len(options) > 10
+    for place in ("share/bash-completion/completions/perigeo", "share/zsh/site-functions/_perigeo"):
+        text = (prefix / place).read_text()
+        assert [name for name in options if name not in text] == []
+    for name in options:
+        assert f"\\fB{name}\\fR" in page
+    post = (prefix / "share/man/man1/perigeo-post.1").read_text().replace("\\-", "-")
+    for words in ("perigeo-post advise", "--platen", "perigeo-post study studies/horizon.toml"):
+        assert words in post
+
+
+@pytest.mark.parametrize(
+    ("line", "offered"),
+    [
+        ("perigeo --re", {"--restart"}),
+        ("perigeo --check ca", {"case.nml", "case/"}),
+        ("perigeo-post cu", {"curves"}),
+        ("perigeo-post curves run.h5 --pl", {"--platen"}),
+        ("perigeo-post curves --platen f", {"first"}),
+        ("perigeo-post curves ru", {"run.h5"}),
+    ],
+)
+def test_bash_completes(prefix, tmp_path, line, offered):
+    for name in ("case.nml", "case.txt", "run.h5", "run.log"):
+        (tmp_path / name).touch()
+    (tmp_path / "case").mkdir()
+    words = line.split(" ")
+    script = prefix / "share/bash-completion/completions" / words[0]
+    text = (
+        f"source '{script}'; COMP_WORDS=({line}); COMP_CWORD={len(words) - 1}; "
+        f"_{words[0].replace('-', '_')}; printf '%s\\n' \"${{COMPREPLY[@]}}\""
+    )
+    done = subprocess.run(
+        ["bash", "-c", text], cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    assert set(done.stdout.split()) == offered
+
+
+@pytest.mark.skipif(not shutil.which("man"), reason="no man")
+@pytest.mark.parametrize("name", ["perigeo", "perigeo-post"])
+def test_man_has_nothing_to_say_against_a_page(prefix, name):
+    page = prefix / f"share/man/man1/{name}.1"
+    done = subprocess.run(
+        ["man", "--warnings", "-l", str(page)], capture_output=True, text=True, check=True,
+        env={**os.environ, "MANPAGER": "cat", "LC_ALL": "C.UTF-8", "MANWIDTH": "120"},
+    )  # fmt: skip
+    assert "EXAMPLES" in done.stdout or "examples" in done.stdout or "exit status" in done.stdout
+    assert done.stderr == ""
+
+
+def test_nothing_is_left_but_what_was_there(program, tmp_path):
+    prefix = tmp_path / "usr"
+    foreign = prefix / "share/man/man1/other.1"
+    foreign.parent.mkdir(parents=True)
+    foreign.touch()
+    install("install", prefix, program, POST="0")
+    assert not (prefix / "bin/perigeo-post").exists()
+    assert "gone" not in install("install", prefix, program)  # over the one before
+    (prefix / "lib/perigeo/python/perigeo_post/__pycache__").mkdir()
+    assert "is gone from" in install("uninstall", prefix, program)
+    assert files(prefix) == ["share/man/man1/other.1"]
+    assert sorted(path.name for path in prefix.iterdir()) == ["share"]
+    assert "there is no perigeo" in install("uninstall", prefix, program)
+
+
+def test_a_package_is_made_below_destdir(program, tmp_path):
+    install("install", "/opt/soil", program, DESTDIR=str(tmp_path))
+    root = tmp_path / "opt/soil"
+    launcher = (root / "bin/perigeo-post").read_text()
+    assert "/opt/soil/lib/perigeo/python" in launcher
+    assert str(tmp_path) not in launcher
+    assert not any(str(tmp_path) in (root / name).read_text(errors="replace")
+                   for name in files(root) if name.startswith("share/") and ".png" not in name)  # fmt: skip
+
+
+def test_without_a_python_that_fits_the_program_is_installed_all_the_same(program, tmp_path):
+    said = install("install", tmp_path, program, PYTHON="false")
+    assert "perigeo-post is not installed" in said
+    assert "pip install" in said
+    assert Path(tmp_path, "bin", program.name).is_file()
+    assert not Path(tmp_path, "bin/perigeo-post").exists()
