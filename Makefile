@@ -59,7 +59,7 @@ studies := fig3a fig3b fig4 fig5 seeds horizon loading size softening influence 
   zero_energy equilibrium
 .PHONY: all program objects post debug units demo demo-quick test lint verify \
   layers setup install help clean distclean figures $(studies) \
-  report report-view site site-view bench clouds finite_elements limit_loads
+  report report-view gallery site site-view bench clouds finite_elements limit_loads
 .DEFAULT_GOAL := all
 
 help_width := 13
@@ -129,6 +129,11 @@ lint:              ## compiler warnings as errors, Fortran and Python linters, l
 	@sh tools/setup.sh lint
 	@sh tools/lint.sh '$(MAKE)' $(parallel)
 
+gallery:           ## draw every kind of figure, in results/gallery; PUBLISH=1: into doc/gallery.md
+	@sh tools/setup.sh run
+	@$(submake) $(parallel) program
+	@$(venv)/bin/python tools/make_gallery.py $(if $(PUBLISH),--publish)
+
 site:              ## documents, tutorials, gallery and modules as pages: build/site/index.html
 	@sh tools/setup.sh site
 	@$(venv)/bin/python tools/make_site.py build/site
@@ -189,7 +194,7 @@ help:              ## list the targets
 # ---------------------------------------------------------------------------------- compiling
 # The rest needs the compiler and HDF5, which `make demo` may have to install first.
 ifneq ($(filter-out setup demo demo-quick test debug lint verify layers help clean \
-  distclean figures $(studies) report report-view site site-view bench clouds finite_elements limit_loads,\
+  distclean figures $(studies) report report-view gallery site site-view bench clouds finite_elements limit_loads,\
   $(or $(MAKECMDGOALS),all)),)
 
 ifeq ($(shell command -v $(firstword $(FC)) 2>/dev/null),)

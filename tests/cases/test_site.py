@@ -10,6 +10,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "tools"))
 
+import make_gallery  # noqa: E402
 from site_pages.build import Site  # noqa: E402
 from site_pages.faults import faults  # noqa: E402
 from site_pages.fortran import read_module  # noqa: E402
@@ -129,3 +130,25 @@ def test_a_notebook_shows_its_text_code_and_figures():
     assert '<a href="b.html">words</a>' in made.body
     assert "True" in made.body
     assert "data:image/png;base64,AAAA" in made.body
+
+
+def test_the_gallery_is_the_one_of_its_list():
+    assert make_gallery.PAGE.read_text() == make_gallery.page()
+    inputs = {e.made_from for entries in make_gallery.SECTIONS.values() for e in entries}
+    inputs = {make_gallery.RUNS[name][0] if name in make_gallery.RUNS else name for name in inputs}
+    assert not [name for name in inputs if not (ROOT / name).is_file()]
+    shown = re.findall(r"\]\((figures/[^)]*)\)", make_gallery.page())
+    assert len(shown) > 25
+    assert not [name for name in shown if not (ROOT / "doc" / name).is_file()]
+    pictures = {f"figures/gallery/{path.name}" for path in make_gallery.FIGURES.glob("*")}
+    assert pictures <= set(shown)
+
+
+def test_the_gallery_has_every_kind_of_figure():
+    page = make_gallery.page()
+    table = (ROOT / "doc" / "studies.md").read_text().partition("## What to draw")[2]
+    kinds = re.findall(r"^\| `(\w+)` \|", table.partition("| option |")[0], re.M)
+    assert len(kinds) == 6
+    commands = ("curves", "contours", "band", "compare", "animate", "geometry", "study")
+    assert not [name for name in commands if f"perigeo-post {name} " not in page]
+    assert not [kind for kind in kinds if f"`{kind}`:" not in page]
