@@ -26,8 +26,8 @@ HEAD = """\
 # Gallery
 
 Every kind of figure that perigeo draws, with the input and the command that make it. `make gallery`
-draws all but the last two sections, in a minute or two. The ending of the name behind `-o` makes it
-a PDF, SVG or EPS. This page is written by `make gallery PUBLISH=1`, from `tools/gallery/entries.py`.
+draws all but the last two sections, in a minute or two. The ending of the name behind `-o` makes
+it a PDF, SVG or EPS. `make gallery PUBLISH=1` writes this page, from `tools/gallery/entries.py`.
 """
 
 
