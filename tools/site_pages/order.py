@@ -49,7 +49,6 @@ GROUPS = {
     ],
     "Theory and proof": [
         "doc/theory.md",
-        "doc/symbols.md",
         "doc/verification.md",
         "doc/study_tables.md",
     ],
