@@ -56,3 +56,38 @@ def test_the_warnings_of_the_limits_are_those_of_the_program():
     assert len(named) > 6
     assert not [name for name in named if f"doubt_kind_t('{name}'" not in kinds]
     assert len(LIMITS) == 14
+
+
+def glossary():
+    """Return symbol, names in the code and modules of every row of the glossary."""
+    text = (DOC / "theory.md").read_text().partition("## Glossary")[2].partition("\n## ")[0]
+    rows = [line[1:-1].split(" | ") for line in text.splitlines() if line.startswith("| ")]
+    rows = [[cell.strip() for cell in row] for row in rows if "in the code" not in row]
+    return [
+        (row[0], re.findall(r"`([\w%]+)`", row[2]), re.findall(r"`(\w+)`", row[3])) for row in rows
+    ]
+
+
+def test_the_glossary_names_the_code():
+    modules = {path.stem: path.read_text() for path in (ROOT / "src").glob("*/*.f90")}
+    rows = glossary()
+    assert len(rows) > 60
+    for symbol, names, places in rows:
+        assert bool(places) == bool(names) or names == ["m"], symbol
+        text = "\n".join(modules[place] for place in places)
+        parts = {part for name in names for part in name.split("%") if name != "m"}
+        # Components of tensors are put together by the program: plastic_strain_xx.
+        parts = {re.sub(r"_xx$", "", part) for part in parts}
+        assert not [part for part in parts if not re.search(rf"\b{part}|{part}\b", text)], symbol
+
+
+def test_keys_that_other_programs_are_compared_with_exist():
+    page = (DOC / "coming_from.md").read_text()
+    keys = "\n".join(path.read_text() for path in (ROOT / "src" / "input").glob("pd_*_keys.f90"))
+    groups = set(re.findall(r"&(\w+)", page))
+    assert len(groups) > 8
+    assert not [name for name in groups if f"group_key_t('{name}'" not in keys]
+    used = set(re.findall(r"`(?:&\w+ )?(\w+) = '", page))
+    used |= set(re.findall(r"`&\w+ (\w+)`", page))
+    assert len(used) > 6
+    assert not [key for key in used if f"key_t('{key}'" not in keys]
