@@ -59,7 +59,7 @@ studies := fig3a fig3b fig4 fig5 seeds horizon loading size softening influence 
   zero_energy equilibrium
 .PHONY: all program objects post debug units demo demo-quick test lint verify \
   layers setup install uninstall wheel help clean distclean figures $(studies) \
-  report report-view site bench clouds finite_elements limit_loads
+  report report-view gallery site site-view bench clouds finite_elements limit_loads
 .DEFAULT_GOAL := all
 
 help_width := 13
@@ -129,9 +129,18 @@ lint:              ## compiler warnings as errors, Fortran and Python linters, l
 	@sh tools/setup.sh lint
 	@sh tools/lint.sh '$(MAKE)' $(parallel)
 
-site:              ## the documents and a page for every module, in build/site/index.html
+gallery:           ## draw every kind of figure, in results/gallery; PUBLISH=1: into doc/gallery.md
+	@sh tools/setup.sh run
+	@$(submake) $(parallel) program
+	@$(venv)/bin/python tools/make_gallery.py $(if $(PUBLISH),--publish)
+
+site:              ## documents, tutorials, gallery and modules as pages: build/site/index.html
 	@sh tools/setup.sh site
 	@$(venv)/bin/python tools/make_site.py build/site
+
+site-view: site    ## open these pages in a browser without a window: checks and screenshots
+	@sh tools/python_env.sh view
+	@$(venv)/bin/python tools/view_site.py
 
 verify:            ## compare computed values with closed forms, printed as a table
 	@sh tools/setup.sh test
@@ -198,7 +207,8 @@ help:              ## list the targets
 # ---------------------------------------------------------------------------------- compiling
 # The rest needs the compiler and HDF5, which `make demo` may have to install first.
 ifneq ($(filter-out setup uninstall wheel demo demo-quick test debug lint verify layers help clean \
-  distclean figures $(studies) report report-view site bench clouds finite_elements limit_loads,\
+  distclean figures $(studies) report report-view gallery site site-view bench clouds \
+  finite_elements limit_loads,\
   $(or $(MAKECMDGOALS),all)),)
 
 ifeq ($(shell command -v $(firstword $(FC)) 2>/dev/null),)

@@ -52,7 +52,7 @@ text_files() {
     -name '*.egg-info' -o -name '.*_cache' -o -name shared \) -prune -o -type f \
     \( -name '*.f90' -o -name '*.in' -o -name '*.pf' -o -name '*.py' -o -name '*.sh' -o \
     -name '*.awk' -o -name '*.nml' -o -name '*.toml' -o -name '*.md' -o -name '*.cff' -o \
-    -name '*.yaml' -o -name '*.html' -o -name '*.css' -o -name .editorconfig -o \
+    -name '*.yaml' -o -name '*.html' -o -name '*.css' -o -name '*.js' -o -name .editorconfig -o \
     -name .codespellrc -o -name Makefile -o -path './.ci/run' \) -print
 }
 

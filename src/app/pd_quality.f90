@@ -1,11 +1,12 @@
 !> How far the numbers of a run can be trusted, as it is at a moment: a handful of ratios, all small
 !> in a good quasi-static run (and det F near 1).
 !>
-!> Doubts compare them with their thresholds as the run goes on; the last line but one of the log,
+!> Doubts compare them with their thresholds as the run goes on; a line near the end of the log,
 !> and the result file, tell them as they are at the end.
 !> Source: doc/doubts.md; doc/theory.md, section 10.
 module pd_quality
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite, ieee_quiet_nan, ieee_value
+  use pd_doubt_list, only: where_to_read
   use pd_errors, only: error_list_t
   use pd_kinds, only: wp
   use pd_observe, only: imbalance, over_work
@@ -107,7 +108,8 @@ contains
   end subroutine find_quality
 
   !> Tell the quality in a line, and write it into the result file: at the end, or as it was at the
-  !> last row of a run that has failed, whose state has no zero-energy part to speak of.
+  !> last row of a run that has failed, whose state has no zero-energy part to speak of. Where there
+  !> were warnings, tell what to read.
   subroutine tell_quality(run, failed, errors)
     type(run_t),        intent(inout) :: run
     logical,            intent(in)    :: failed
@@ -126,6 +128,7 @@ contains
     call append('smallest det F', quality%min_det_f, percent=.false.)
     call append('zero-energy over strain', quality%zero_energy, percent=.false.)
     call record_line(run%record, line, errors)
+    if (run%doubts%any_told()) call record_line(run%record, where_to_read, errors)
     call record_quality(run%record, quality, errors)
 
   contains

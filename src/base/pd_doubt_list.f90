@@ -12,7 +12,10 @@ module pd_doubt_list
   private
 
   public :: doubt_kind_t, doubt_kinds, doubts_t, is_doubtful, kind_number, never
-  public :: write_doubt_table
+  public :: where_to_read, write_doubt_table
+
+  character(*), parameter :: where_to_read = 'what was warned of: doc/doubts.md; how far numbers '// &
+    'can be trusted: doc/limits.md'
 
   !> One kind of doubt.
   type :: doubt_kind_t
@@ -94,6 +97,7 @@ module pd_doubt_list
     procedure :: add
     procedure :: note
     procedure :: is_told
+    procedure :: any_told
     procedure :: count => number_of_messages
     procedure :: message
     procedure :: print => print_messages
@@ -184,6 +188,13 @@ contains
     is_told = self%step(kind_number(name)) /= never
   end function is_told
 
+  !> Whether any doubt was told.
+  pure logical function any_told(self)
+    class(doubts_t), intent(in) :: self
+
+    any_told = any(self%step /= never)
+  end function any_told
+
   !> How many doubts there are in words.
   pure integer function number_of_messages(self) result(n)
     class(doubts_t), intent(in) :: self
@@ -200,12 +211,13 @@ contains
     text = self%words%message(i)
   end function message
 
-  !> Print one doubt per line: 'perigeo: warning: ...'.
+  !> Print one doubt per line: 'perigeo: warning: ...', and where to read on.
   subroutine print_messages(self, unit)
     class(doubts_t), intent(in) :: self
     integer,         intent(in) :: unit
 
     call self%words%print(unit, 'warning')
+    if (self%count() > 0) write (unit, '(a)') where_to_read
   end subroutine print_messages
 
 end module pd_doubt_list

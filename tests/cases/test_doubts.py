@@ -210,6 +210,7 @@ def test_what_is_hardly_meant_is_told_at_the_start(run_case, clouds, tmp_path, d
         done = run_case(text, tmp_path, "--check")
         assert done.returncode == 0, done.stderr
         assert (doubt in told(done.stdout)) == raised, done.stdout
+        assert ("doc/limits.md" in done.stdout) == bool(told(done.stdout))
 
 
 @pytest.mark.parametrize("doubt", IN_THE_RUN)
@@ -223,6 +224,7 @@ def test_what_goes_wrong_in_a_run_is_told_once(run_case, tmp_path, doubt):
         found = doubts_of(tmp_path / "out" / "case.h5")
         assert (doubt in found) == raised
         assert told(log) == set(found)
+        assert log.count("doc/limits.md") == bool(found)
         if raised:
             assert found[doubt][0] > 0
             assert math.isfinite(found[doubt][1])

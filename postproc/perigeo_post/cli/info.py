@@ -90,6 +90,8 @@ def _trust_text(facts: dict[str, Any]) -> list[str]:
     if first is not None:
         after = [f for f in facts["frames"] if f["valid"] and f["step"] >= first]
         lines.append(f"               {len(after)} of the frames come at or after step {first}")
+    if lines:
+        lines.append("               what they mean: doc/doubts.md, doc/limits.md")
     if facts["quality"]:
         words = ", ".join(f"{key} {value:.3g}" for key, value in facts["quality"].items())
         lines.append(f"  quality      {words}")

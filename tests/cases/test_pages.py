@@ -1,0 +1,93 @@
+"""What pages say agrees with the sources and with the tables that they take numbers from."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+DOC = ROOT / "doc"
+
+
+def code_lines(text):
+    """Return the lines of a text that are not blank."""
+    return [line for line in text.splitlines() if line.strip()]
+
+
+def test_the_code_of_the_law_is_the_file_of_the_tests():
+    page = (DOC / "material_law.md").read_text()
+    blocks = re.findall(r"^```fortran\n(.*?)^```", page, re.M | re.S)
+    assert len(blocks) > 5
+    file = (ROOT / "tests" / "unit" / "damage_law.f90").read_text()
+    assert code_lines("".join(blocks)) == code_lines(file)
+
+
+def test_the_places_that_a_law_is_named_at_are_there():
+    setup = (ROOT / "src" / "setup" / "pd_setup_materials.f90").read_text()
+    keys = (ROOT / "src" / "input" / "pd_material_keys.f90").read_text()
+    assert "    else if (given%model == 'j2') then" in setup
+    assert "key_t('model', required=.true., choices='elastic j2'" in keys
+    page = (DOC / "material_law.md").read_text()
+    law = (ROOT / "src" / "material" / "pd_law.f90").read_text()
+    deferred = re.findall(r"deferred(?:, nopass)? :: (\w+)", law)
+    assert len(deferred) == 6
+    assert "six procedures" in page
+    assert all(f"procedure, nopass :: {name}" in page or f"procedure :: {name}" in page
+               for name in deferred)  # fmt: skip
+
+
+LIMITS = [line for line in (DOC / "limits.md").read_text().splitlines() if line[:3] == "| *"
+          or line[:4] == "| th" or re.match(r"\| (a|two|what) ", line)]  # fmt: skip
+
+
+@pytest.mark.parametrize("line", LIMITS, ids=lambda line: re.sub(r"\W+", "_", line[2:30]))
+def test_the_numbers_of_a_limit_are_published(line):
+    said = line.split(" | ")[2]
+    pages = ["choices.md", "model.md", "verification.md"]
+    text = "\n".join((DOC / name).read_text() for name in pages)
+    numbers = re.findall(r"(?<![\w.-])\d+\.?\d*(?:e-\d+)?", re.sub(r"\]\([^)]*\)", "", said))
+    missing = [n for n in numbers if not re.search(rf"(?<![\d.]){re.escape(n)}(?![\d])", text)]
+    assert not missing
+
+
+def test_the_warnings_of_the_limits_are_those_of_the_program():
+    kinds = (ROOT / "src" / "base" / "pd_doubt_list.f90").read_text()
+    named = {n for line in LIMITS for n in re.findall(r"`(\w+)`", line.split(" | ")[3])}
+    assert len(named) > 6
+    assert not [name for name in named if f"doubt_kind_t('{name}'" not in kinds]
+    assert len(LIMITS) == 14
+
+
+def glossary():
+    """Return symbol, names in the code and modules of every row of the glossary."""
+    text = (DOC / "theory.md").read_text().partition("## Glossary")[2].partition("\n## ")[0]
+    rows = [line[1:-1].split(" | ") for line in text.splitlines() if line.startswith("| ")]
+    rows = [[cell.strip() for cell in row] for row in rows if "in the code" not in row]
+    return [
+        (row[0], re.findall(r"`([\w%]+)`", row[2]), re.findall(r"`(\w+)`", row[3])) for row in rows
+    ]
+
+
+def test_the_glossary_names_the_code():
+    modules = {path.stem: path.read_text() for path in (ROOT / "src").glob("*/*.f90")}
+    rows = glossary()
+    assert len(rows) > 60
+    for symbol, names, places in rows:
+        assert bool(places) == bool(names) or names == ["m"], symbol
+        text = "\n".join(modules[place] for place in places)
+        parts = {part for name in names for part in name.split("%") if name != "m"}
+        # Components of tensors are put together by the program: plastic_strain_xx.
+        parts = {re.sub(r"_xx$", "", part) for part in parts}
+        assert not [part for part in parts if not re.search(rf"\b{part}|{part}\b", text)], symbol
+
+
+def test_keys_that_other_programs_are_compared_with_exist():
+    page = (DOC / "coming_from.md").read_text()
+    keys = "\n".join(path.read_text() for path in (ROOT / "src" / "input").glob("pd_*_keys.f90"))
+    groups = set(re.findall(r"&(\w+)", page))
+    assert len(groups) > 8
+    assert not [name for name in groups if f"group_key_t('{name}'" not in keys]
+    used = set(re.findall(r"`(?:&\w+ )?(\w+) = '", page))
+    used |= set(re.findall(r"`&\w+ (\w+)`", page))
+    assert len(used) > 6
+    assert not [key for key in used if f"key_t('{key}'" not in keys]
