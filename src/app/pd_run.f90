@@ -30,6 +30,7 @@ module pd_run
   use pd_run_description, only: provenance_t
   use pd_schedule, only: schedule_t
   use pd_setup, only: set_up_model
+  use pd_setup_changes, only: repeat_changes
   use pd_setup_schedule, only: set_up_schedule
   use pd_setup_stages, only: set_up_stage_body, set_up_whole
   use pd_size, only: look_at_memory, look_at_size
@@ -107,6 +108,8 @@ contains
     call try_later_stages(run, options%check, errors)
     call outcome%end_if_any(errors, exit_model)
     if (outcome%done) return
+    if (allocated(run%checkpoint%changes)) &
+      call repeat_changes(run%checkpoint%changes, run%model)
     call keep_standing_load(run, run%stages(run%checkpoint%clock%stage), run%model)
     call look_at_model(run%input, run%model, run%doubts)
     call compare_history(run%checkpoint, run%state, run%model, run%input%path, errors)

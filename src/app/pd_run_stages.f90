@@ -6,6 +6,7 @@
 !> stage (a load, `pd_body_force`).
 !> Source: doc/theory.md, section 7.
 module pd_run_stages
+  use pd_changes, only: changes_of
   use pd_division, only: divide_model
   use pd_doubt_list, only: doubts_t
   use pd_errors, only: error_list_t, exit_file, exit_input, exit_model, outcome_t
@@ -18,6 +19,7 @@ module pd_run_stages
   use pd_record, only: observe_state, record_line
   use pd_run, only: add_release, keep_standing_load, run_t, start_increments
   use pd_setup, only: set_up_model
+  use pd_setup_changes, only: repeat_changes
   use pd_setup_stages, only: set_up_stage_body
   use pd_stability, only: find_highest_frequency
   use pd_text, only: short_number
@@ -77,6 +79,7 @@ contains
       if (errors%count() + input_errors%count() == 0) &
         call set_up_model(run%input, model, errors, stage)
       if (errors%count() + input_errors%count() == 0) then
+        call repeat_changes(changes_of(run%model%supports), model)
         call keep_standing_load(run, stage, model)
         call divide_model(run%ranks, model)
       end if

@@ -10,6 +10,7 @@ program perigeo
   use pd_exit, only: leave
   use pd_increment, only: take_increment
   use pd_run, only: open_outputs, run_t, set_up_run
+  use pd_run_changes, only: begin_motion_if_due
   use pd_run_end, only: close_run, end_without_equilibrium, finish_run
   use pd_run_stages, only: begin_stage_if_due
   use pd_run_steps, only: due_after_step, due_t, write_what_is_due
@@ -32,6 +33,9 @@ program perigeo
   call catch_signals()
   if (.not. outcome%done) call open_outputs(options, run, outcome)
   do while (.not. outcome%done .and. .not. run%schedule%is_over(run%clock))
+    call begin_motion_if_due(run, outcome)
+    call begin_stage_if_due(run, outcome)
+    if (outcome%done) exit
     if (run%model%at_equilibrium) then
       call take_increment(run%clock, run%schedule, run%model, run%state, run%increments, &
         run%ledger, run%timing)
@@ -49,7 +53,6 @@ program perigeo
         run%timing, failed_row)
     end if
     call write_what_is_due(due, failed_row, run, outcome)
-    call begin_stage_if_due(run, outcome)
   end do
   if (.not. outcome%done) call look_at_end(run, outcome)
   if (.not. (outcome%done .or. run%increments%lost)) call find_factor_of_safety(run, outcome)

@@ -12,7 +12,7 @@ module pd_load_checks
   use pd_motion_checks, only: check_increasing
   use pd_namelist, only: max_problems
   use pd_namelist_groups, only: namelist_group_t, place_of
-  use pd_platen_checks, only: platen_under_load
+  use pd_platen_checks, only: all_moved_later, platen_under_load
   use pd_sides, only: normal_axis
   use pd_text, only: integer_text, number_text
   implicit none
@@ -37,6 +37,7 @@ contains
         call check_traction(input, input%boundaries(k), group, errors)
       else
         call add_useless(group, 'ramp_time', 'without traction', errors)
+        call add_useless(group, 'traction_until', 'without traction', errors)
       end if
       call check_part(input, input%boundaries(k), group, errors)
     end do
@@ -68,11 +69,13 @@ contains
       where=place_of(group, 'side'), found='''all''', &
       allowed='''bottom'', ''top'', ''left'', ''right''')
     do i = 1, size(motions)
+      if (is_given(group, 'traction_until')) exit
       if (.not. is_given(group, trim(motions(i)))) cycle
       call errors%add('a motion beside a traction', where=place_of(group, trim(motions(i))), &
-        found='both', allowed='a motion or a traction')
+        found='both', allowed='a motion or a traction, or traction_until, the time between them')
       exit
     end do
+    call check_until(input, b, group, errors)
     if (b%contact /= 'smooth' .or. size(b%traction) == 0) return
     along = merge(2, 1, b%axis == 1)
     if (abs(b%traction(along)) > 0.0_wp) call errors%add( &
@@ -80,6 +83,25 @@ contains
       where=place_of(group, 'traction'), found=number_text(b%traction(along)), &
       allowed='0 as component '//integer_text(along)//', or contact = ''rough''')
   end subroutine check_traction
+
+  !> The time at which a traction gives way to motion.
+  subroutine check_until(input, b, group, errors)
+    type(input_t),          intent(in)    :: input
+    type(boundary_input_t), intent(in)    :: b
+    type(namelist_group_t), intent(in)    :: group
+    type(error_list_t),     intent(inout) :: errors
+
+    if (.not. is_set(b%traction_until)) return
+    if (b%ramp_time > b%traction_until) call errors%add( &
+      'the traction ends before it is whole', where=place_of(group, 'traction_until'), &
+      found=number_text(b%traction_until), allowed='at least the ramp_time, '// &
+      number_text(b%ramp_time)//' [s]')
+    if (.not. is_set(input%integration%end_time)) return
+    if (b%traction_until >= input%integration%end_time) call errors%add( &
+      'the motion after the traction begins when the run is over', &
+      where=place_of(group, 'traction_until'), found=number_text(b%traction_until), &
+      allowed='< '//number_text(input%integration%end_time)//' [s]')
+  end subroutine check_until
 
   !> Keys that need the motion of the platens before the run.
   subroutine check_strains(input, groups, errors)
@@ -96,9 +118,10 @@ contains
       where=place_of(integration, 'final_strain'), allowed='end_time in its place')
     if (is_given(output, 'frame_strains')) call errors%add(unknown, &
       where=place_of(output, 'frame_strains'), allowed='frame_times or frame_count in its place')
-    if (input%integration%damping_frame == 'platens') call errors%add( &
+    if (input%integration%damping_frame == 'platens' .and. .not. all_moved_later(input)) &
+      call errors%add( &
       'a platen moves under a traction: its own motion would not be damped', &
-      where=place_of(integration, 'damping_frame'), found='''platens''', allowed='''rest''')
+      where=place_of(integration, 'damping_frame'), found='''platens''', allowed='''rest'', or traction_until')
   end subroutine check_strains
 
   subroutine check_name(input, k, group, errors)

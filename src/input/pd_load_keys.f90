@@ -23,6 +23,7 @@ module pd_load_keys
     real(wp), allocatable :: factors(:)                !! size 0: 1 at all times
     real(wp), allocatable :: traction(:)               !! x, y [Pa]; size 0: motion prescribed
     real(wp) :: ramp_time = 0.0_wp                     !! of the traction [s]
+    real(wp) :: traction_until = unset                 !! motion from then on [s]; unset: never
   contains
     procedure :: visit => visit_boundary
   end type boundary_input_t
@@ -89,11 +90,15 @@ contains
       stands_for='1 at all times', also='as many as times; only with affine', &
       meaning='factors on velocity_gradient at these times'), self%factors)
     call visitor%list_key(key_t('traction', count=2, unit='Pa', stands_for='none', &
-      also='in place of a motion; smooth: 0 along the side; a whole side only, not affine', &
+      also='in place of a motion, or before it, see traction_until; smooth: 0 along the side; a whole side only, not affine', &
       meaning='force per area that acts on the platen from outside, x and y: the platen moves ' &
       //'under it and stays plane'), self%traction)
     call visitor%real_key(key_t('ramp_time', unit='s', default='0.0', range=not_negative, &
       needs_effect=.true., also='only with traction', meaning=ramp), self%ramp_time)
+    call visitor%real_key(key_t('traction_until', unit='s', stands_for='the end of the run', &
+      range=positive, also='only with traction; not before its ramp_time; within the run', &
+      meaning='time at which the traction ends: from then on the boundary is moved, by ' &
+      //'velocity or the tables, from where it is'), self%traction_until)
   end subroutine visit_boundary
 
   subroutine visit_pressure(self, visitor)

@@ -9,6 +9,7 @@ module pd_platen_checks
   private
 
   public :: platens_of, platen_approach, platen_extent, platen_under_load
+  public :: all_moved_later
 
 contains
 
@@ -48,6 +49,19 @@ contains
       found = found .or. size(input%boundaries(input%platens(i))%traction) > 0
     end do
   end function platen_under_load
+
+  !> Whether each of the platens is moved, if only after a load.
+  pure logical function all_moved_later(input) result(moved)
+    type(input_t), intent(in) :: input
+    integer :: i
+
+    moved = .true.
+    do i = 1, 2
+      associate (b => input%boundaries(input%platens(i)))
+        if (size(b%traction) > 0) moved = moved .and. is_set(b%traction_until)
+      end associate
+    end do
+  end function all_moved_later
 
   !> Rate at which the platens of the input approach each other [m/s]. Needs platens, and tables as
   !> long as times.

@@ -29,6 +29,7 @@ module pd_body_force
     procedure :: description
     procedure :: acceleration
     procedure :: divide
+    procedure :: leave
     procedure :: total
   end type body_force_t
 
@@ -110,6 +111,23 @@ contains
 
     self%blocks = blocks
   end subroutine divide
+
+  !> Act no longer on some rows, in some components.
+  pure subroutine leave(self, rows, components, t, force)
+    class(body_force_t), intent(inout) :: self
+    integer,             intent(in)    :: rows(:)
+    logical,             intent(in)    :: components(2)   !! x, y
+    real(wp),            intent(in)    :: t               !! [s]
+    real(wp),            intent(inout) :: force(2)        !! grows by what acted on them [N/m]
+    integer :: c
+
+    do c = 1, 2
+      if (.not. components(c)) cycle
+      force(c) = force(c) + self%factor%rate(t) &
+        * ordered_sum(self%volume(rows) * self%density(rows, c))
+      self%density(rows, c) = 0.0_wp
+    end do
+  end subroutine leave
 
   pure function acceleration(self, t)
     class(body_force_t), intent(in) :: self

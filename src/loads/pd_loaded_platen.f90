@@ -10,6 +10,7 @@
 module pd_loaded_platen
   use pd_kinds, only: ordered_sum, wp
   use pd_point_sets, only: point_set_t
+  use pd_rigid_support, only: rigid_support_t
   use pd_supports, only: reaction, support_t
   use pd_tables, only: new_ramp, table_t
   use pd_text, only: short_number
@@ -24,6 +25,8 @@ module pd_loaded_platen
     real(wp), private :: full(2) = 0.0_wp                !! F, the same over its length [N/m]
     type(table_t), private :: factor                     !! r
     real(wp), private :: ramp_time = 0.0_wp              !! [s]
+    type(rigid_support_t), allocatable :: next           !! that takes over from it, if one does
+    real(wp) :: until = huge(1.0_wp)                     !! time at which it does [s]
   contains
     procedure :: mark_prescribed
     procedure :: prescribe
@@ -146,6 +149,7 @@ contains
       self%name//': '//short_number(self%full(1))//', '//short_number(self%full(2))// &
       ' N/m in all'
     if (self%ramp_time > 0.0_wp) text = text//', whole from '//short_number(self%ramp_time)//' s'
+    if (allocated(self%next)) text = text//', motion from '//short_number(self%until)//' s on'
   end function description
 
 end module pd_loaded_platen

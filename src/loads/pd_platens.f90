@@ -10,7 +10,7 @@ module pd_platens
   implicit none
   private
 
-  public :: platens_t, new_platens, nominal_strain, time_of_strain, reference_ends
+  public :: platens_t, new_platens, move_frame, nominal_strain, time_of_strain, reference_ends
   public :: times_of_strains
 
   type :: platens_t
@@ -36,7 +36,6 @@ contains
     integer,          intent(in) :: supports(2)           !! their numbers
     real(wp),         intent(in) :: lower(2), upper(2)    !! corners of the extent of the body [m]
     type(table_t) :: one, two
-    integer :: c
 
     platens%axis = axis
     platens%first = supports(1)
@@ -45,20 +44,32 @@ contains
     platens%length = upper(axis) - lower(axis)
     platens%width = upper(3 - axis) - lower(3 - axis)
     platens%points = [first%points(1), second%points(1)]
+    one = first%common_velocity(axis)
+    two = second%common_velocity(axis)
+    if (allocated(one%times) .and. allocated(two%times)) then
+      platens%strain = difference(one, two)
+      platens%strain%rates = platens%strain%rates / platens%length
+    end if
+    call move_frame(platens, first, second)
+  end function new_platens
+
+  !> The ends of the frame move as the supports at both ends prescribe.
+  pure subroutine move_frame(platens, first, second)
+    type(platens_t),  intent(inout) :: platens
+    class(support_t), intent(in)    :: first, second      !! at the lower and the upper end
+    type(table_t) :: one, two
+    integer :: c
+
     do c = 1, 2
       one = first%common_velocity(c)
       two = second%common_velocity(c)
-      if (c == axis .and. allocated(one%times) .and. allocated(two%times)) then
-        platens%strain = difference(one, two)
-        platens%strain%rates = platens%strain%rates / platens%length
-      end if
       if (.not. allocated(one%times)) one = two
       if (.not. allocated(one%times)) one = constant_table(0.0_wp)
       if (.not. allocated(two%times)) two = one
       platens%lower(c) = one
       platens%upper(c) = two
     end do
-  end function new_platens
+  end subroutine move_frame
 
   !> Nominal strain: relative approach of the platens over the extent of the body between them,
   !> compression positive; 0 where there are no platens.

@@ -2,6 +2,7 @@
 !>
 !>   u_c(t) = a_c(t) in the prescribed components c; the rate of a_c is a table
 !>
+!> Where it takes over from a load, a_c begins with the displacement that is there.
 !> Source: doc/theory.md, section 7.
 module pd_rigid_support
   use pd_kinds, only: wp
@@ -16,6 +17,8 @@ module pd_rigid_support
   type, extends(support_t) :: rigid_support_t
     logical :: prescribed(2) = .false.                   !! x, y
     type(table_t) :: velocity(2)                         !! x, y [m/s]
+    real(wp) :: since = -1.0_wp                          !! it took over from a load [s]; < 0: none
+    real(wp) :: place(2) = 0.0_wp                        !! displacement at that time [m]
     real(wp), private :: mass(2) = 0.0_wp                !! that moves with it [kg/m]
     real(wp), private :: force_before(2) = 0.0_wp        !! `force` in the step before [N/m]
   contains
@@ -24,6 +27,8 @@ module pd_rigid_support
     procedure :: take_reactions
     procedure :: work
     procedure :: common_velocity
+    procedure :: take_over
+    procedure :: gain
   end type rigid_support_t
 
 contains
@@ -64,7 +69,7 @@ contains
 
     do c = 1, 2
       if (.not. self%prescribed(c)) cycle
-      u(self%points, c) = self%velocity(c)%integral(t)
+      u(self%points, c) = self%place(c) + self%velocity(c)%integral(t)
       v(self%points, c) = self%velocity(c)%rate(t)
     end do
   end subroutine prescribe
@@ -103,5 +108,29 @@ contains
 
     if (self%prescribed(c)) velocity = self%velocity(c)
   end function common_velocity
+
+  !> Go on from where a load has brought the points: displacements count from there and then.
+  pure subroutine take_over(self, place, t)
+    class(rigid_support_t), intent(inout) :: self
+    real(wp),               intent(in)    :: place(2)   !! displacement of the points [m]
+    real(wp),               intent(in)    :: t          !! [s]
+
+    self%since = t
+    self%place = place
+    self%velocity%since = t
+  end subroutine take_over
+
+  !> Kinetic energy that its points gain where they take its velocity [J/m].
+  pure real(wp) function gain(self, v, t)
+    class(rigid_support_t), intent(in) :: self
+    real(wp),               intent(in) :: v(2)   !! that they have now [m/s]
+    real(wp),               intent(in) :: t      !! [s]
+    integer :: c
+
+    gain = 0.0_wp
+    do c = 1, 2
+      gain = gain + 0.5_wp * self%mass(c) * (self%velocity(c)%rate(t)**2 - v(c)**2)
+    end do
+  end function gain
 
 end module pd_rigid_support

@@ -38,6 +38,7 @@ module pd_checkpoint
     real(wp),     allocatable :: position(:, :)     !! (n,2) [m]
     real(wp),     allocatable :: volume(:)          !! (n) [m^2]
     integer,      allocatable :: boundary(:)        !! (n)
+    real(wp),     allocatable :: changes(:, :)      !! of supports, from load to motion (3,supports)
   end type checkpoint_t
 
   !> Write the fields of a state into an open file, and read them.
@@ -62,7 +63,7 @@ module pd_checkpoint
   end type reading_t
 
   integer, parameter :: head_length = 512
-  integer, parameter :: schema_version = 5
+  integer, parameter :: schema_version = 6
   character(*), parameter :: schema = 'perigeo checkpoint'
 
 contains
@@ -198,6 +199,7 @@ contains
     call write_dataset(file, '/position', checkpoint%position, errors)
     call write_dataset(file, '/volume', checkpoint%volume, errors)
     call write_dataset(file, '/boundary', checkpoint%boundary, errors)
+    call write_dataset(file, '/changes', checkpoint%changes, errors)
   end subroutine write_numbers
 
   subroutine write_1(self, about, values)
@@ -337,6 +339,7 @@ contains
     call read_dataset(file, '/position', checkpoint%position, errors)
     call read_dataset(file, '/volume', checkpoint%volume, errors)
     call read_dataset(file, '/boundary', checkpoint%boundary, errors)
+    call read_dataset(file, '/changes', checkpoint%changes, errors)
   end subroutine read_numbers
 
   !> Whether a file begins with the head that belongs to the rest of it.

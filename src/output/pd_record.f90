@@ -3,6 +3,7 @@
 !> The only module that knows both the physics and the output.
 module pd_record
   use pd_agreement, only: any_rank
+  use pd_changes, only: changes_of, n_change
   use pd_checkpoint, only: checkpoint_t, read_checkpoint, remove_checkpoints, &
     write_checkpoint
   use pd_clock, only: clock_t
@@ -373,6 +374,8 @@ contains
     checkpoint%ledger_blocks(:, 3) = whole%frame_work
     checkpoint%ledger_blocks(:, 4) = whole%control
     checkpoint%input = record%values
+    allocate (checkpoint%changes(n_change, max(1, size(model%supports%items))), source=-1.0_wp)
+    checkpoint%changes(:, :size(model%supports%items)) = changes_of(model%supports)
     call points_of(model, checkpoint%position, checkpoint%volume, checkpoint%boundary)
     call write_checkpoint(record%stem, checkpoint, state, model%shown%row, errors, model%blocks)
   end subroutine put_checkpoint

@@ -7,8 +7,8 @@ module pd_setup_loads
   use pd_errors, only: error_list_t
   use pd_input_shapes, only: body_number, is_bearing
   use pd_input_types, only: boundary_input_t, input_t, pressure_input_t
-  use pd_kinds, only: wp
-  use pd_loaded_platen, only: new_loaded_platen
+  use pd_kinds, only: is_set, wp
+  use pd_loaded_platen, only: loaded_platen_t, new_loaded_platen
   use pd_loads, only: load_t
   use pd_model, only: model_t
   use pd_platens, only: new_platens
@@ -77,6 +77,7 @@ contains
     class(support_t), allocatable, intent(out) :: support
     type(point_set_t) :: set
     type(table_t) :: motion(3)
+    type(loaded_platen_t) :: platen
 
     associate (b => given(k), body => model%body)
       set = boundary_set(b%name, body%boundary, k)
@@ -88,9 +89,14 @@ contains
         allocate (support, source=new_affine_support(set, b%velocity_gradient, motion(3), &
           model%points%position, mass))
       else if (size(b%traction) > 0 .and. size(set%points) > 0) then
-        allocate (support, source=new_loaded_platen(set, taken(b), b%traction, &
+        platen = new_loaded_platen(set, taken(b), b%traction, &
           loaded_lengths(given, body%sides(side_number(b%side)), body%boundary), b%ramp_time, &
-          since))
+          since)
+        if (is_set(b%traction_until)) then
+          platen%next = new_rigid_support(set, taken(b), motion(:2), mass)
+          platen%until = b%traction_until
+        end if
+        allocate (support, source=platen)
       else if (is_bearing(b)) then
         allocate (support, source=new_sliding_support(set, b%axis, motion(:2), mass))
       else

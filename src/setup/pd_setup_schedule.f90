@@ -47,6 +47,7 @@ contains
       end if
     end associate
     call add_ends_of_stages(input, frame_times)
+    call add_changes(input, end_time, frame_times)
     if (errors%count() > 0) return
     if (any(frame_times > end_time * (1.0_wp + 1.0e-9_wp))) then
       call errors%add('a frame is asked for after the end of the run', '&output')
@@ -79,16 +80,37 @@ contains
   pure subroutine add_ends_of_stages(input, times)
     type(input_t),         intent(in)    :: input
     real(wp), allocatable, intent(inout) :: times(:)   !! ascending [s]
-    real(wp), parameter :: same = 1.0e-9_wp
     integer :: k
 
     do k = 1, size(input%stages)
-      associate (t => input%stages(k)%end_time)
-        if (any(abs(times - t) <= same * t)) cycle
-        times = [pack(times, times < t), t, pack(times, times > t)]
-      end associate
+      call add_time(input%stages(k)%end_time, times)
     end do
   end subroutine add_ends_of_stages
+
+  !> A frame where a load gives way to motion.
+  pure subroutine add_changes(input, end_time, times)
+    type(input_t),         intent(in)    :: input
+    real(wp),              intent(in)    :: end_time   !! [s]
+    real(wp), allocatable, intent(inout) :: times(:)   !! ascending [s]
+    integer :: k
+
+    do k = 1, size(input%boundaries)
+      associate (t => input%boundaries(k)%traction_until)
+        if (.not. is_set(t)) cycle
+        if (t < end_time) call add_time(t, times)
+      end associate
+    end do
+  end subroutine add_changes
+
+  !> One more time, unless it is there.
+  pure subroutine add_time(t, times)
+    real(wp),              intent(in)    :: t          !! [s]
+    real(wp), allocatable, intent(inout) :: times(:)   !! ascending [s]
+    real(wp), parameter :: same = 1.0e-9_wp
+
+    if (any(abs(times - t) <= same * t)) return
+    times = [pack(times, times < t), t, pack(times, times > t)]
+  end subroutine add_time
 
   !> Time step by the rule of the input, or the longest increment on the way of equilibrium, unless
   !> it is known.

@@ -189,7 +189,17 @@ MISTAKES = {
     "motion and traction": (
         "velocity = 0.0, -0.01",
         "velocity = 0.0, -0.01, traction = 0.0, -1.0",
-        "velocity: a motion beside a traction; found: both; allowed: a motion or a traction",
+        "velocity: a motion beside a traction; found: both; allowed: a motion or a traction, or",
+    ),
+    "end of a load that is not there": (
+        "-0.01 /",
+        "-0.01, traction_until = 1 /",
+        "traction_until: the key has no effect without traction",
+    ),
+    "end of a load before it is whole": (
+        "velocity = 0.0, -0.01",
+        "velocity = 0.0, -0.01, traction = 0.0, -1.0, ramp_time = 2.0, traction_until = 1.0",
+        "traction_until: the traction ends before it is whole; found: 1.0; allowed: at least the",
     ),
     "traction along a smooth side": (
         "velocity = 0.0, -0.01",

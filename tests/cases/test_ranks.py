@@ -20,6 +20,7 @@ from test_bearings import BOX, HALF, MOTION, REST
 from test_equilibrium import RESTING
 from test_ground import CLAY, COLUMN, EQUILIBRIUM, FOOTING, MOVING
 from test_stages import BAR, BLOCKS
+from test_strain_control import RESTING as LABORATORY
 
 TIME_LIMIT = 300.0
 ENVIRONMENT = {
@@ -164,6 +165,9 @@ CASES = {
         RESTING, spacing="0.05", horizon="0.16", final_strain="0.005"
     ).replace("increments = 100", "increments = 20").replace("= 0.004, 0.01", "= 0.004"),
     "stages": BLOCKS,
+    "from load to motion": LABORATORY.replace(
+        "spacing = 0.01, horizon = 0.025", "spacing = 0.0025, horizon = 0.0075"
+    ).replace("increments = 40", "increments = 10"),
     "bearings": FINE_BOX.replace("-8.0e-5", "-0.05") + MOTION.replace("0.4", "0.1"),
     "bearings in a list": FINE_BOX.replace("'case',", "'case', operators = 'list',")
     + MOTION.replace("0.4", "0.05"),

@@ -585,6 +585,27 @@ def traction() -> list[Row]:
     ]
 
 
+def isotropic() -> list[Row]:
+    """Biaxial test from 100 kPa all round: start, modulus, limit (input/biaxial_isotropic.nml)."""
+    nu, youngs, c_u, cell, change = 0.45, 30.0e6, 50.0e3, 100.0e3, 0.5
+    history = shipped("biaxial_isotropic").history()
+    time, flow = history["time"], np.asarray(history["max_plastic_strain"])
+    start = int(np.searchsorted(time, change - 1.0e-6))
+    elastic = int(np.argmax(flow > 0.0)) - 2
+    names = ("mean_stress_xx", "mean_stress_yy", "mean_strain_yy")
+    xx, yy, strain = (np.asarray(history[name]) for name in names)
+    slope = (yy - nu / (1.0 - nu) * xx)[[start, elastic]]  # sigma_3 changes by a little too
+    modulus = float(np.diff(slope)[0] / np.diff(strain[[start, elastic]])[0])
+    exact = youngs / (1.0 - nu**2)
+    lines = [
+        ("stress yy before the change", "kPa", -cell / 1e3, float(yy[start]) / 1e3, 5.0e-3),
+        ("stress xx before the change", "kPa", -cell / 1e3, float(xx[start]) / 1e3, 2.0e-2),
+        ("modulus after it, E / (1 - nu^2)", "MPa", exact / 1e6, modulus / 1e6, 1.0e-2),
+        ("limit, sigma_1 - sigma_3 = 2 c_u", "kPa", 2e-3 * c_u, float(xx[-1] - yy[-1]) / 1e3, 1e-2),
+    ]
+    return [Row("isotropic", *line, "closed form") for line in lines]
+
+
 def shipped(path: str, *settings: str, name: str = "", threads: int = 1) -> Run:
     """Run an input of the folder input/, perhaps with settings and under another name."""
     name = name or Path(path).name
@@ -773,6 +794,7 @@ CASES: dict[str, Callable[[], list[Row]]] = {
     "wave": wave,
     "pressure": pressure,
     "traction": traction,
+    "isotropic": isotropic,
     "compression": compression,
     "perfect": perfect,
     "footing": footing,
