@@ -101,6 +101,21 @@ def slope(degrees, first, largest):
     return mesh, low, high
 
 
+def block(ratio, first, largest):
+    """Bound p / (2 c) on a block between rough platens, of height 1 and so many times as wide."""
+    x = graded(ratio / 2.0, 0.0, first, GROWTH, largest)[::-1]
+    y = graded(0.5, 0.0, first, GROWTH, largest)[::-1]
+    mesh = Mesh(*np.meshgrid(x, y, indexing="ij"))
+
+    def part(m):
+        if m[1] > 0.5 - SMALL:
+            return "load"
+        return "axis" if min(m) < SMALL else "free"
+
+    low, high = loaded(mesh, uniform, part, "rough", -1.0)
+    return mesh, low / (2.0 * ratio), high / (2.0 * ratio)
+
+
 CASES = {
     "trapdoor H/B=1 rough": (trapdoor, 1, "rough"),
     "trapdoor H/B=1 smooth": (trapdoor, 1, "smooth"),
@@ -112,6 +127,8 @@ CASES = {
     "footing kB/c0=4 smooth": (footing, 4, "smooth"),
     "slope 90 degrees": (slope, 90.0),
     "slope 60 degrees": (slope, 60.0),
+    "block w/h=2": (block, 2.0),
+    "block w/h=4": (block, 4.0),
 }
 # Steps at the singular point, and far from it; the last pair is for --fine.
 MESHES = ((0.08, 0.16), (0.04, 0.1), (0.02, 0.06))

@@ -86,13 +86,13 @@ def footing_rows():
 
 
 def bound_rows():
-    """Return the rows of trapdoor, cut and slope."""
+    """Return the rows of trapdoor, cut, slope and block."""
     for case, rows in BOUNDS.items():
         if case.startswith("footing"):
             continue
         low, high = bounds(case)
         by_mesh = ", ".join(f"{r['triangles']}: {r['lower']:.3f} {r['upper']:.3f}" for r in rows)
-        name = "N" if case.startswith("trapdoor") else "gamma h/c"
+        name = {"trapdoor": "N", "block": "p/2c"}.get(case.split()[0], "gamma h/c")
         note = f"half the gap is {100.0 * (high - low) / (high + low):.2f} % of the mean"
         yield case, name, f"{low:.3f} {high:.3f}", f"finite elements, {by_mesh}", note
     for degrees, published in ((90, 3.83), (60, TAYLOR_60)):
