@@ -130,7 +130,7 @@ contains
       ends = merge(places%line([left, right]), places%line([bottom, top]), axis == 2)
       call find_range(layer, origin(along), ends, places%squares(:, along), lattice, on_line, &
         squares)
-      square = places%line(side) - merge(0, merge(0, 1, lattice%cells), step > 0)
+      square = places%line(side) - merge(1, 0, step > 0 .and. .not. lattice%cells)
       do k = 1, p + 1
         if (on_line(1) == ends(1)) then
           if (k <= p) call own(k, ends(1) - p, ends(1) - 1)
