@@ -32,6 +32,8 @@ program perigeo
   call catch_signals()
   if (.not. outcome%done) call open_outputs(options, run, outcome)
   do while (.not. outcome%done .and. .not. run%schedule%is_over(run%clock))
+    call begin_stage_if_due(run, outcome)   ! a checkpoint is of the state before it
+    if (outcome%done) exit
     if (run%model%at_equilibrium) then
       call take_increment(run%clock, run%schedule, run%model, run%state, run%increments, &
         run%ledger, run%timing)
@@ -49,7 +51,6 @@ program perigeo
         run%timing, failed_row)
     end if
     call write_what_is_due(due, failed_row, run, outcome)
-    call begin_stage_if_due(run, outcome)
   end do
   if (.not. outcome%done) call look_at_end(run, outcome)
   if (.not. (outcome%done .or. run%increments%lost)) call find_factor_of_safety(run, outcome)
