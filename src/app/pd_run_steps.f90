@@ -43,13 +43,9 @@ contains
     due%frame = run%schedule%frames_due(step) > 0
     if (.not. run%record%elsewhere) &
       due%progress = progress_due(run%record%progress, step, run%schedule%steps)
-    associate (every => run%input%output%checkpoint_every)
-      if (every > 0.0_wp) then
-        call system_clock(now, rate)
-        due%checkpoint = step == run%schedule%steps .or. &
-          real(now - run%last_checkpoint, wp) >= every * real(rate, wp)
-      end if
-    end associate
+    call system_clock(now, rate)
+    due%checkpoint = run%input%output%checkpoint_due(real(now - run%last_checkpoint, wp) &
+      / real(rate, wp), last=step == run%schedule%steps)
     found = [pending_signal(), merge(1, 0, due%checkpoint), merge(1, 0, due%progress), &
       merge(1, 0, run%trouble%count() > 0)]
     call run%ranks%largest_numbers(found)

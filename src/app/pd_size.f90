@@ -7,7 +7,7 @@ module pd_size
   use pd_input_types, only: input_t
   use pd_kinds, only: wp
   use pd_model, only: model_t
-  use pd_room, only: has_room, machine_memory
+  use pd_room, only: has_room, machine_memory, stack_limit
   use pd_summary, only: memory_of_run
   use pd_text, only: short_number
   implicit none
@@ -18,13 +18,16 @@ module pd_size
   !> Memory that a point needs at least [bytes]: in a rectangle; to find out what lies in a body of
   !> another shape, per place in the box around it.
   real(wp), parameter :: of_point = 450.0_wp, of_place = 100.0_wp
-  real(wp), parameter :: gigabyte = 1.0e9_wp
+  real(wp), parameter :: gigabyte = 1.0e9_wp, kilobyte = 1024.0_wp
+
+  !> Kernels keep blocks of rows there, some 120 kB in all.
+  real(wp), parameter :: least_stack = 256.0_wp * kilobyte
 
 contains
 
   !> Before the body is set up. A body that takes long to set up is announced with `aloud`.
   !>
-  !> Errors: the machine has too little memory.
+  !> Errors: the machine has too little memory, the stack has no room for a block of rows.
   subroutine look_at_size(input, aloud, errors)
     type(input_t),      intent(in)    :: input
     logical,            intent(in)    :: aloud
@@ -33,6 +36,12 @@ contains
     real(wp) :: lower(2), upper(2), places, bytes
     logical  :: known, all_material
 
+    if (stack_limit() < least_stack) then
+      call errors%add('the limit of the stack (ulimit -s) is too small for any run', &
+        found=short_number(stack_limit() / kilobyte)//' kB', &
+        allowed=short_number(least_stack / kilobyte)//' kB or more')
+      return
+    end if
     call find_extents(input%bodies, input%discretisation%spacing, lower, upper, known)
     if (.not. known .or. input%bodies(1)%shape == 'file') return
     places = product((upper - lower) / input%discretisation%spacing + 1.0_wp)

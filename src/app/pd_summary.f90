@@ -256,7 +256,7 @@ contains
     state%remembered = model%materials%remembered()
     state%has_initial_strain = is_set(input%initial_stress%k0)
     at_times = 5
-    if (input%output%checkpoint_every > 0.0_wp) at_times = at_times + 15
+    if (input%output%checkpoint_due(huge(1.0_wp), last=.false.)) at_times = at_times + 15
     do k = 1, size(input%materials)
       if (input%materials(k)%strain_measure /= 'small') at_times = max(at_times, 21)
     end do

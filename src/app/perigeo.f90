@@ -34,7 +34,7 @@ program perigeo
   if (.not. outcome%done) call open_outputs(options, run, outcome)
   do while (.not. outcome%done .and. .not. run%schedule%is_over(run%clock))
     call begin_motion_if_due(run, outcome)
-    call begin_stage_if_due(run, outcome)
+    call begin_stage_if_due(run, outcome)   ! a checkpoint is of the state before it
     if (outcome%done) exit
     if (run%model%at_equilibrium) then
       call take_increment(run%clock, run%schedule, run%model, run%state, run%increments, &

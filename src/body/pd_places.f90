@@ -5,7 +5,7 @@
 !> lines; place and square (0, 0) are the lower left ones of the body.
 !> Source: doc/theory.md, section 1.
 module pd_places
-  use pd_kinds, only: wp
+  use pd_kinds, only: i8, wp
   use pd_region, only: area_within, box_of, mark_edges, on_edges, part_on, parts_on_grid, shape_t
   use pd_sides, only: bottom, left, right, side_count, top
   implicit none
@@ -206,20 +206,24 @@ contains
   pure integer function nearest_point(places, i, j) result(k)
     type(places_t), intent(in) :: places
     integer,        intent(in) :: i, j
-    integer :: a, b, least, reach
+    integer     :: a, aside, b, reach
+    integer(i8) :: least, square
 
-    least = huge(1)
+    least = huge(1_i8)
     k = 0
     reach = 0
-    do while (reach**2 < least .and. reach <= sum(shape(places%owner)))
+    do while (int(reach, i8)**2 < least .and. reach <= sum(shape(places%owner)))
       reach = reach + 1
       do b = max(lbound(places%owner, 2), j - reach), min(ubound(places%owner, 2), j + reach)
-        do a = max(lbound(places%owner, 1), i - reach), min(ubound(places%owner, 1), i + reach)
-          if (max(abs(a - i), abs(b - j)) /= reach) cycle
+        ! the ring of this reach: whole rows above and below, two places of those between
+        aside = merge(1, 2 * reach, abs(b - j) == reach)
+        do a = i - reach, i + reach, aside
+          if (a < lbound(places%owner, 1) .or. a > ubound(places%owner, 1)) cycle
           if (places%owner(a, b) /= 0) cycle
-          if ((a - i)**2 + (b - j)**2 > least) cycle
-          if ((a - i)**2 + (b - j)**2 == least .and. places%number(a, b) > k) cycle
-          least = (a - i)**2 + (b - j)**2
+          square = int(a - i, i8)**2 + int(b - j, i8)**2
+          if (square > least) cycle
+          if (square == least .and. places%number(a, b) > k) cycle
+          least = square
           k = places%number(a, b)
         end do
       end do

@@ -4,7 +4,7 @@
 !> because the problem has been reported already.
 module pd_input_checks
   use pd_errors, only: error_list_t
-  use pd_input_shapes, only: find_extents
+  use pd_input_shapes, only: find_extents, outline
   use pd_input_types, only: body_input_t, input_t
   use pd_input_values, only: group_named, is_damaged, is_given
   use pd_kinds, only: is_set, wp
@@ -312,7 +312,33 @@ contains
       'the bodies, or the box around them, would have too many points', &
       where=place_of(group_named(groups, 'discretisation', 1, input%path), 'spacing'), &
       found='about '//number_text(rounded(points)), allowed='at most 1e8')
+    call check_holes_are_near(input, groups, errors)
   end subroutine check_number_of_points
+
+  !> Report holes so far from the solids that no place of the lattice can be counted there.
+  subroutine check_holes_are_near(input, groups, errors)
+    type(input_t),          intent(in)    :: input
+    type(namelist_group_t), intent(in)    :: groups(:)
+    type(error_list_t),     intent(inout) :: errors
+    real(wp) :: farthest, lower(2), upper(2)
+    real(wp), allocatable :: v(:, :)
+    logical :: known
+    integer :: k
+
+    associate (spacing => input%discretisation%spacing)
+      call find_extents(input%bodies, spacing, lower, upper, known)
+      if (.not. known) return
+      do k = 1, size(input%bodies)
+        if (input%bodies(k)%role /= 'hole') cycle
+        v = outline(input%bodies(k), spacing)
+        if (size(v) == 0) cycle
+        farthest = max(maxval(upper - minval(v, 2)), maxval(maxval(v, 2) - lower))
+        if (farthest/spacing > max_points) call errors%add('the hole reaches too far away from '// &
+          'the solid bodies', where=place_of(group_named(groups, 'body', k, input%path)), &
+          found='about '//number_text(rounded(farthest))//' m', allowed='at most 1e8 spacings')
+      end do
+    end associate
+  end subroutine check_holes_are_near
 
   !> About how many points there are in the box around bodies; 0 where it is not known.
   pure real(wp) function points_of(bodies, spacing)

@@ -3,7 +3,7 @@
 !> A key is a component here and a line in the procedure that visits it: nothing else lists it.
 module pd_run_keys
   use pd_keys, only: any_count, group_key_t, key_t, key_visitor_t, not_negative, positive, range_t
-  use pd_kinds, only: wp
+  use pd_kinds, only: is_set, unset, wp
   implicit none
   private
 
@@ -25,10 +25,11 @@ module pd_run_keys
     real(wp), allocatable :: frame_times(:)            !! [s]; size 0: not given
     integer  :: frame_count = 0                        !! 0: not given
     integer  :: history_count = 1000
-    real(wp) :: checkpoint_every = 0.0_wp              !! wall seconds
+    real(wp) :: checkpoint_every = unset               !! wall seconds; unset: see below
   contains
     procedure :: visit => visit_output
     procedure :: complete => complete_output
+    procedure :: checkpoint_due
   end type output_input_t
 
 contains
@@ -78,8 +79,10 @@ contains
     call visitor%integer_key(key_t('history_count', unit='1', default='1000', &
       range=range_t(1.0_wp, real(max_rows, wp)), &
       meaning='rows of the history over the run, the unloaded state aside'), self%history_count)
-    call visitor%real_key(key_t('checkpoint_every', unit='s', default='0.0', range=not_negative, &
-      meaning='wall-clock time between checkpoints; 0: only when stopped by a signal'), &
+    call visitor%real_key(key_t('checkpoint_every', unit='s', range=not_negative, &
+      stands_for='900, and none of the last step', &
+      meaning='wall-clock time between checkpoints, the last one of the last step; 0: only when ' &
+      //'stopped by a signal'), &
       self%checkpoint_every)
   end subroutine visit_output
 
@@ -90,5 +93,20 @@ contains
     if (size(self%frame_strains) == 0 .and. size(self%frame_times) == 0 &
         .and. self%frame_count == 0) self%frame_count = frames_by_default
   end subroutine complete_output
+
+  !> Whether a checkpoint is due for the clock's sake. Who asks for some gets one of the last step as
+  !> well; of a run that says nothing one is kept too, so seldom that it costs nothing.
+  pure logical function checkpoint_due(self, seconds, last) result(due)
+    class(output_input_t), intent(in) :: self
+    real(wp), intent(in) :: seconds   !! since the last checkpoint, or since the run began
+    logical,  intent(in) :: last      !! at the last step
+    real(wp), parameter  :: by_default = 900.0_wp
+
+    if (is_set(self%checkpoint_every)) then
+      due = self%checkpoint_every > 0.0_wp .and. (last .or. seconds >= self%checkpoint_every)
+    else
+      due = seconds >= by_default
+    end if
+  end function checkpoint_due
 
 end module pd_run_keys

@@ -69,7 +69,7 @@ contains
     allocate (schedule%frame_times, source=frame_times)
     allocate (schedule%frame_steps(size(frame_times)), source=0)
     if (end_time / clock%time_step > most_steps) then
-      write (text, '(es10.3)') end_time / clock%time_step
+      write (text, '(es11.3e3)') end_time / clock%time_step
       call errors%add('the run has too many steps', '&integration', trim(adjustl(text)), &
         'up to 1.9e9')
       return

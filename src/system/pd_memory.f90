@@ -17,6 +17,7 @@ module pd_memory
   ! `exit_model` of pd_errors: this source stands alone, for the Makefile tries it by itself
   integer(c_int), parameter :: exit_status = 3_c_int
   integer(c_size_t), parameter :: line = 64_c_size_t         !! [bytes]
+  integer(c_size_t), parameter :: small = 16_c_size_t        !! what malloc keeps to [bytes]
   integer(c_size_t), parameter :: least = 1024_c_size_t      !! smaller ones: as they come [bytes]
   integer(c_size_t), parameter :: large = 2_c_size_t**20     !! [bytes]
   integer(c_int),    parameter :: mmap_threshold = -3_c_int  !! M_MMAP_THRESHOLD of malloc.h
@@ -59,7 +60,8 @@ contains
     integer(c_int) :: done
 
     if (bytes < least) then
-      address = c_aligned_alloc(16_c_size_t, max(bytes, 1_c_size_t))   ! malloc by another name
+      ! malloc by another name; strict libraries want a multiple of the alignment
+      address = c_aligned_alloc(small, small * ((max(bytes, 1_c_size_t) + small - 1) / small))
       if (.not. c_associated(address)) call end_without_memory(bytes)
       return
     end if

@@ -1,11 +1,11 @@
 !> How much memory a run may have.
 module pd_room
-  use, intrinsic :: iso_c_binding, only: c_associated, c_ptr, c_size_t
+  use, intrinsic :: iso_c_binding, only: c_associated, c_int, c_long, c_ptr, c_size_t
   use pd_kinds, only: wp
   implicit none
   private
 
-  public :: has_room, machine_memory
+  public :: has_room, machine_memory, stack_limit
 
   interface
     type(c_ptr) function c_aligned_alloc(alignment, bytes) bind(c, name='aligned_alloc')
@@ -16,6 +16,11 @@ module pd_room
       import :: c_ptr
       type(c_ptr), value :: address
     end subroutine c_free
+    integer(c_int) function c_getrlimit(resource, limits) bind(c, name='getrlimit')
+      import :: c_int, c_long
+      integer(c_int), value :: resource
+      integer(c_long), intent(out) :: limits(2)   !! of now, and the highest that may be asked for
+    end function c_getrlimit
   end interface
 
 contains
@@ -45,6 +50,16 @@ contains
     bytes = min(bytes, number_in('/sys/fs/cgroup/memory.max'), &
       number_in('/sys/fs/cgroup/memory/memory.limit_in_bytes'))
   end function machine_memory
+
+  !> How large the stack may become (ulimit -s) [bytes]; huge where nothing limits it.
+  real(wp) function stack_limit() result(bytes)
+    integer(c_int), parameter :: of_the_stack = 3_c_int   ! RLIMIT_STACK of Linux, macOS and BSD
+    integer(c_long) :: limits(2)
+
+    bytes = huge(1.0_wp)
+    if (c_getrlimit(of_the_stack, limits) /= 0) return
+    if (limits(1) >= 0) bytes = real(limits(1), wp)   ! beyond all integers: without a limit
+  end function stack_limit
 
   !> An entry of /proc/meminfo [bytes]; 0 where there is none.
   real(wp) function kilobytes_of(name) result(bytes)

@@ -140,6 +140,38 @@ def test_a_restart_in_any_stage_gives_the_same_bits(program, run_case, tmp_path,
     assert_same(tmp_path / "out", straight / "out")
 
 
+def step_of(path):
+    """The step of a checkpoint; -1 where there is none, or it is being written."""
+    try:
+        with h5py.File(path, "r", locking=False) as file:
+            return int(file.attrs["step"])
+    except (OSError, KeyError):
+        return -1
+
+
+def test_a_run_killed_just_before_a_stage_begins_gives_the_same_bits(program, run_case, tmp_path):
+    """Its checkpoint is of the last step of a stage: the next one begins with the restart."""
+    text = changed(BLOCKS, spacing="0.2", horizon="0.6", increments="10", residual="1.0e-5")
+    text = text.replace("frame_count", "checkpoint_every = 1.0e-9, frame_count")
+    straight = tmp_path / "straight"
+    straight.mkdir()
+    done = run_case(text, straight, "--quiet", "--threads", "1")
+    assert done.returncode == 0, done.stderr
+    newest = tmp_path / "out" / "case_checkpoint.h5"
+    for _ in range(50):  # until it is killed within the step that follows
+        process = begin(program, tmp_path, text, "--force")
+        while process.poll() is None and step_of(newest) != 10:
+            pass
+        process.kill()
+        process.wait()
+        if step_of(newest) == 10:
+            break
+    assert step_of(newest) == 10
+    done = run_case(text, tmp_path, "--restart", "--quiet", "--threads", "1")
+    assert done.returncode == 0, done.stderr
+    assert_same(tmp_path / "out", straight / "out")
+
+
 def test_the_factor_of_safety_of_a_bar_is_that_of_its_strength(run, tmp_path):
     _, _, log = run(BAR)
     borne, not_borne = map(float, re.search(r"safety: (\S+) is borne, (\S+) is not", log).groups())
