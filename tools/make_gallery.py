@@ -16,6 +16,7 @@ import sys
 from pathlib import Path
 
 from gallery.entries import POST, RUNS, SECTIONS, STUDY, Entry
+from PIL import Image
 
 ROOT = Path(__file__).resolve().parents[1]
 RESULTS = ROOT / "results" / "gallery"
@@ -69,10 +70,18 @@ def draw() -> None:
                 execute([*words, "-o", f"results/gallery/{entry.picture}.{ending}"])
 
 
+def small(image: Image.Image) -> Image.Image:
+    """Return a picture at most 1000 pixels wide, with 64 colours that cover all that it has."""
+    image = image.convert("RGB")
+    if image.width > 1000:
+        size = (1000, round(1000 * image.height / image.width))
+        image = image.resize(size, Image.Resampling.LANCZOS)
+    cover = Image.Quantize.MAXCOVERAGE
+    return image.quantize(64, method=cover, dither=Image.Dither.NONE)
+
+
 def publish() -> None:
     """Put the pictures into the documents, small."""
-    from PIL import Image
-
     FIGURES.mkdir(exist_ok=True)
     for entries in SECTIONS.values():
         for entry in entries:
@@ -86,13 +95,7 @@ def publish() -> None:
             image = Image.open(path)
             if path.suffix == ".gif":
                 image.seek(image.n_frames - 1)
-            image = image.convert("RGB")
-            if image.width > 1000:
-                size = (1000, round(1000 * image.height / image.width))
-                image = image.resize(size, Image.Resampling.LANCZOS)
-            # Colours of curves are few beside white: they are kept where edges are not dithered.
-            small = image.quantize(64, dither=Image.Dither.NONE)
-            small.save(FIGURES / f"{entry.picture}.png", optimize=True)
+            small(image).save(FIGURES / f"{entry.picture}.png", optimize=True)
 
 
 def commands(entry: Entry) -> list[str]:

@@ -22,7 +22,7 @@ from PIL import Image
 from perigeo_post import OutputError, RequestError, ResultError
 from perigeo_post.cli.command_line import main
 from perigeo_post.report.check import LARGE, check_report, check_text
-from perigeo_post.report.publish import BEGIN, END, publish, tables
+from perigeo_post.report.publish import APPENDIX, BEGIN, END, findings, publish, tables
 from perigeo_post.report.values import (
     HEADLINE,
     QUALITY,
@@ -303,10 +303,11 @@ def test_verdicts_are_counted(results: Path) -> None:
     findings = [finding | {"verdict": v} for v in verdicts] + [finding | beyond]
     change(results / "fig3a", findings=findings)
     text = page_of(results).text
-    assert text.count("Beyond the paper: It is blue.") == 2
-    assert "agrees2agrees in part1differs2doesnothold1no result1" in text.replace(" ", "").replace(
-        "agreesinpart", "agrees in part"
-    ).replace("noresult", "no result")
+    assert text.count("We claim") == 2
+    assert text.count("It is blue.") == 2
+    close = text.replace(" ", "")
+    assert "Statementsofthepaper:6agrees2agreesinpart1differs2noresult1Ownchecks" in close
+    assert "Ownchecks:1doesnothold1Runs" in close
 
 
 def test_order_is_that_of_the_paper_and_the_page_is_reproducible(results: Path) -> None:
@@ -632,13 +633,30 @@ def test_command_writes_the_page_and_the_document(
     assert "| modulus platen | MPa | 51.04 | 50.64 | 50.24 |" in text
     assert main(["report", "--publish"]) == 0
     assert document.read_text() == text
+    appendix = document.with_name(APPENDIX)
+    appendix.write_text(f"Values.\n\n{BEGIN}\n{END}\n")
+    assert main(["report", "--publish"]) == 0
+    assert capsys.readouterr().out.endswith(f"wrote {Path('doc') / APPENDIX}\n")
+    assert "| modulus platen |" not in document.read_text()
+    assert "| modulus platen | MPa | 51.04 | 50.64 | 50.24 |" in appendix.read_text()
+    assert "It converges." not in appendix.read_text()
+
+
+def test_own_checks_are_published_apart(results: Path) -> None:
+    finding = json.loads((results / "fig3a" / "study.json").read_text())["findings"][0]
+    claim = {"paper": "", "claim": "It is blue.", "verdict": "holds"}
+    change(results / "fig3a", findings=[finding, finding | claim, finding | claim])
+    paper, own = findings(gather(results)).split("**Own checks")
+    assert "It is blue." not in paper
+    assert own.startswith(", beyond the paper** (2: 2 holds)")
+    assert own.count("It is blue.") == 2
 
 
 def test_published_text_stays_text(results: Path) -> None:
-    findings = json.loads((results / "fig3a" / "study.json").read_text())["findings"]
+    finding = json.loads((results / "fig3a" / "study.json").read_text())["findings"][0]
     wild = "a | <b>&\n*b* `c` [d](e)"
-    change(results / "fig3a", findings=[findings[0] | {"found": wild}], title="T | <i>")
-    text = tables(gather(results))
+    change(results / "fig3a", findings=[finding | {"found": wild}], title="T | <i>")
+    text = findings(gather(results))
     assert "a \\| &lt;b&gt;&amp; \\*b\\* \\`c\\` \\[d\\](e)" in text
     rows = [line for line in text.splitlines() if "Convergence" in line]
     assert len(rows) == 2

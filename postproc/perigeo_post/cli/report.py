@@ -26,8 +26,8 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     )  # fmt: skip
     parser.add_argument(
         "--publish", metavar="DOCUMENT", type=Path, nargs="?", const=DOCUMENT,
-        help="also write the tables between the markers of this document (default: "
-        "doc/verification.md)",
+        help="also write the findings between the markers of this document (default: "
+        "doc/verification.md), the values into study_tables.md beside it",
     )  # fmt: skip
 
 
@@ -49,4 +49,5 @@ def carry_out(args: argparse.Namespace) -> None:
     if report.unreadable:
         raise ResultError(f"{report.path} lacks what could not be read; see above")
     if args.publish is not None:
-        print(f"wrote {publish(report.material, args.publish)}")
+        for path in publish(report.material, args.publish):
+            print(f"wrote {path}")

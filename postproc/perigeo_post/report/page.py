@@ -28,7 +28,18 @@ def page_html(material: Material) -> tuple[str, list[str]]:
         for s in studies for run in s.runs if run.status == FAILED
     }  # fmt: skip
     problems = [*material.problems, *(words for one in sections for words in one.problems)]
-    counts = Counter(finding.verdict for study in studies for finding in study.findings)
+    counts = Counter((f.of_the_paper, f.verdict) for study in studies for f in study.findings)
+    tallies = [
+        (
+            title,
+            [
+                (verdict, counts[(paper, verdict)])
+                for verdict in VERDICTS
+                if counts[(paper, verdict)]
+            ],
+        )
+        for title, paper in (("Statements of the paper", True), ("Own checks", False))
+    ]
     runs = {state: sum(s.count(state) for s in studies) for state in (DONE, FAILED, MISSING)}
     template = environment().get_template("page.html")
     text = template.render(
@@ -38,7 +49,7 @@ def page_html(material: Material) -> tuple[str, list[str]]:
         failures=failures,
         problems=problems,
         origin=origin(material),
-        verdicts=[(v, counts[v]) for v in VERDICTS if counts[v]],
+        tallies=[(title, sum(n for _, n in found), found) for title, found in tallies if found],
         runs=runs,
         lacking=[f"{n} {state}" for state, n in runs.items() if state != DONE and n],
         seconds=sum(study.seconds or 0.0 for study in studies),

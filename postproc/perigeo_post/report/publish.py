@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
 from ..read.errors import OutputError, RequestError, ResultError
+from ..study.record import VERDICTS
 from .data import DONE, FAILED, MISSING, Material, Study
 from .study import origin
 from .values import DASH, Line, headline, values_of
 
 BEGIN, END = "<!-- studies: begin -->", "<!-- studies: end -->"
+APPENDIX = "study_tables.md"  # beside the document: where the values go, if it is there
 
 
 def markdown_cell(text: str) -> str:
@@ -37,17 +40,31 @@ def provenance(material: Material) -> str:
     return "Printed by `make report`, " + ", ".join(word for word in words if word) + ":"
 
 
+def findings(material: Material) -> str:
+    """What the paper says and what is found; then what goes beyond the paper."""
+    lines = [provenance(material)]
+    for of_the_paper, title, says in (
+        (True, "What the paper says, what is found", "paper"),
+        (False, "Own checks, beyond the paper", "claim"),
+    ):
+        found = [(s, f) for s in material.studies for f in s.findings]
+        found = [(s, f) for s, f in found if f.of_the_paper == of_the_paper]
+        if not found:
+            continue
+        counts = Counter(f.verdict for _, f in found)
+        words = ", ".join(f"{counts[v]} {v}" for v in VERDICTS if counts[v])
+        lines += ["", f"**{title}** ({len(found)}: {words})", ""]
+        rows = [
+            list(map(markdown_cell, (s.title, f.title, f.statement, f.found, f.verdict)))
+            for s, f in found
+        ]
+        lines += markdown_table(("study", "statement", says, "perigeo", "verdict"), rows)
+    return "\n".join(lines) + "\n"
+
+
 def tables(material: Material) -> str:
-    """All tables: what the paper says and what is found, then the values of every study."""
-    lines = [provenance(material), ""]
-    rows = [
-        list(map(markdown_cell, (study.title, f.title, f.statement, f.found, f.verdict)))
-        for study in material.studies
-        for f in study.findings
-    ]
-    if rows:
-        lines += ["**What the paper says, what is found**", ""]
-        lines += markdown_table(("study", "statement", "paper", "perigeo", "verdict"), rows)
+    """The values of every study."""
+    lines = [provenance(material)]
     for study in material.studies:
         lines += study_tables(study)
     if material.missing:
@@ -79,10 +96,19 @@ def _row(line: Line) -> list[str]:
     return [markdown_cell(line.name), line.unit or "1", *map(markdown_cell, line.cells)]
 
 
-def publish(material: Material, page: Path) -> Path:
-    """Put the tables between the markers of a document."""
+def publish(material: Material, page: Path) -> list[Path]:
+    """Put the findings between the markers of a document, and the values of the studies between
+    those of the appendix beside it; without one below the findings."""
     if not material.studies:
         raise RequestError("there is no study to publish")
+    appendix = page.with_name(APPENDIX)
+    if not appendix.exists():
+        return [put(f"{findings(material)}\n{tables(material)}", page)]
+    return [put(findings(material), page), put(tables(material), appendix)]
+
+
+def put(words: str, page: Path) -> Path:
+    """Put a text between the markers of a document."""
     try:
         text = page.read_text(encoding="utf-8")
     except OSError as error:
@@ -92,7 +118,7 @@ def publish(material: Material, page: Path) -> Path:
     before, rest = text.split(BEGIN)
     after = rest.split(END)[1]
     try:
-        page.write_text(f"{before}{BEGIN}\n{tables(material)}{END}{after}", encoding="utf-8")
+        page.write_text(f"{before}{BEGIN}\n{words}{END}{after}", encoding="utf-8")
     except OSError as error:
         raise OutputError(f"cannot write {page}: {error.strerror or error}") from error
     return page

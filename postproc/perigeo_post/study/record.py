@@ -129,9 +129,14 @@ class FindingRecord(_Part):
     holds: list[Test] = []  # criterion, whether it holds; None: no data
 
     @property
+    def of_the_paper(self) -> bool:
+        """Whether the paper says it; what it does not say is a check of our own."""
+        return bool(self.paper) or not self.claim
+
+    @property
     def statement(self) -> str:
         """What the tests are about: the words of the paper, or what goes beyond it."""
-        return self.paper or (f"Beyond the paper: {self.claim}" if self.claim else "")
+        return self.paper or self.claim
 
 
 class StudyRecord(_Part):
