@@ -30,6 +30,15 @@ else ifeq ($(BUILD),lint)
   march  =
   program = build/lint/perigeo
   unit_flags = $(FFLAGS) $(warnings) -Wno-compare-reals $(no_false_warnings)
+else ifeq ($(BUILD),mutants)
+  # The checks of the checking build, quicker, and all modules in a library: one is compiled anew
+  # without linking program and suites.
+  FFLAGS = -O1 -fPIC -fcheck=bounds -ffpe-trap=invalid,zero,overflow -finit-real=snan
+  march  =
+  ALIGNED = 0
+  program = build/mutants/perigeo
+  unit_flags = -O0 -ffpe-trap=invalid,zero,overflow
+  library = build/mutants/libperigeo.so
 else
   $(error BUILD=$(BUILD): it must be opt or debug)
 endif
@@ -59,7 +68,8 @@ studies := fig3a fig3b fig4 fig5 seeds horizon loading size softening influence 
   zero_energy equilibrium
 .PHONY: all program objects post debug units demo demo-quick test lint verify \
   layers setup install uninstall wheel help clean distclean figures $(studies) \
-  report report-view gallery site site-view bench clouds finite_elements limit_loads
+  report report-view gallery site site-view bench clouds finite_elements limit_loads \
+  mutants
 .DEFAULT_GOAL := all
 
 help_width := 13
@@ -168,6 +178,12 @@ bench:             ## measure the speed on this machine; PUBLISH=1: into doc/per
 	@$(submake) $(parallel) ALIGNED=0 build=build/unaligned program=build/unaligned/perigeo program
 	@$(venv)/bin/python tests/bench/bench.py $(if $(PUBLISH),--publish)
 
+mutants:           ## plant faults in the physics, one at a time: do the tests notice? COUNT= SEED=
+	@sh tools/setup.sh test
+	@$(submake) $(parallel) BUILD=mutants PFUNIT_DIR= program units
+	@$(venv)/bin/python tests/proof/mutants/mutants.py $(if $(COUNT),--count $(COUNT)) \
+	  $(if $(SEED),--seed $(SEED)) $(if $(ONLY),--only $(ONLY))
+
 to_prefix = PREFIX='$(PREFIX)' DESTDIR='$(DESTDIR)' PYTHON='$(PYTHON)' POST='$(POST)' \
   sh tools/install.sh
 
@@ -208,7 +224,7 @@ help:              ## list the targets
 # The rest needs the compiler and HDF5, which `make demo` may have to install first.
 ifneq ($(filter-out setup uninstall wheel demo demo-quick test debug lint verify layers help clean \
   distclean figures $(studies) report report-view gallery site site-view bench clouds \
-  finite_elements limit_loads,\
+  finite_elements limit_loads mutants,\
   $(or $(MAKECMDGOALS),all)),)
 
 ifeq ($(shell command -v $(firstword $(FC)) 2>/dev/null),)
@@ -259,8 +275,14 @@ update := $(shell echo '$(compile) $(hdf5_link) $(mpi_link) $(aligned)' | \
 program: $(if $(wildcard src/app/perigeo.f90),$(program),objects)
 objects: $(objects)
 
-$(program): $(objects)
-	$(call say,link     $@)$(FC) $(flags) -o $@ $(objects) $(hdf5_link) $(mpi_link) $(aligned)
+$(program): $(objects) $(library)
+	$(call say,link     $@)$(FC) $(flags) -o $@ $(if $(library),$(build)/perigeo.o $(library),\
+	  $(objects)) $(hdf5_link) $(mpi_link) $(aligned)
+
+ifneq ($(library),)
+$(library): $(filter-out %/perigeo.o,$(objects))
+	$(call say,link     $@)$(FC) $(flags) -shared -Wl,-soname,$(notdir $@) -o $@ $^ $(hdf5_link)
+endif
 
 $(build)/%.o: %.f90 $(build)/flags
 	$(call say,compile  $<)$(compile) -c $< -o $@
@@ -326,11 +348,12 @@ $(unit)/%.$(unit_form): %.pf $(support)/pf_to_f90.py
 
 # Modules of a suite go to a folder of its own: with pFUnit every driver has the same names. What
 # a suite is linked with is in depends.mk.
-$(suites:%=$(unit)/%): $(unit)/%: $(unit)/%.$(unit_form) $(runner)
+$(suites:%=$(unit)/%): $(unit)/%: $(unit)/%.$(unit_form) $(runner) | $(library)
 	@mkdir -p $@.modules
 	@echo 'ADD_TEST_SUITE($*_suite)' > $@.modules/$*.inc
 	$(call say,compile  $*.pf)$(unit_compile) -I$(unit) -J$@.modules -o $@ $< \
-	  $(call driver,$*) $(filter %.o,$^) $(unit_libs) $(hdf5_link)
+	  $(call driver,$*) $(filter $(if $(library),$(unit)/)%.o,$^) $(library) $(unit_libs) \
+	  $(hdf5_link)
 
 # Who uses whom, written anew when it has changed.
 update := $(shell mkdir -p $(unit); \
