@@ -31,6 +31,7 @@ PAGES = {
     "doc/tutorials/hole.md": "tutorial_hole",
     "doc/model.md": "model",
     "doc/choices.md": "choices",
+    "doc/own_test.md": "own_test",
     "doc/studies.md": "studies",
     "doc/results.md": "results",
     "doc/reliability.md": "reliability",
