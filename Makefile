@@ -195,8 +195,9 @@ uninstall:         ## take away what make install has put into PREFIX
 
 wheel:             ## perigeo-post as a wheel, in build/wheel
 	@sh tools/python_env.sh run
+	@rm -rf build/wheel && mkdir -p build/wheel && cp -R postproc build/wheel/source
 	@$(venv)/bin/python -m pip wheel --quiet --disable-pip-version-check --no-deps \
-	  --wheel-dir build/wheel ./postproc
+	  --wheel-dir build/wheel build/wheel/source && rm -rf build/wheel/source
 	@ls build/wheel/*.whl
 
 clean:             ## remove what was built; keeps .venv and results

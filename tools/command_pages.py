@@ -49,9 +49,7 @@ class Command:
 
 def from_help(name: str, program: str) -> Command:
     """The command that `PROGRAM --help` describes: perigeo."""
-    text = subprocess.run(
-        [program, "--help"], check=True, capture_output=True, text=True
-    ).stdout
+    text = subprocess.run([program, "--help"], check=True, capture_output=True, text=True).stdout
     lines = text.splitlines()
     usage = next(k for k, line in enumerate(lines) if line.startswith("usage: "))
     command = Command(name, lines[usage][len("usage: ") :], " ".join(lines[:usage]).strip())
@@ -171,36 +169,7 @@ def bash(command: Command) -> str:
     parts = command.parts or [command]
     cases = []
     for part in parts:
-        word = part.name.split()[-1]
-        values = []
-        for option in part.options:
-            if not option.value:
-                continue
-            names = "|".join(option.names)
-            reply = {
-                "words": f"COMPREPLY=($(compgen -W '{' '.join(option.choices)}' -- \"$cur\"))",
-                "folder": 'COMPREPLY=($(compgen -d -- "$cur"))',
-                "file": 'COMPREPLY=($(compgen -f -- "$cur"))',
-                "any": "COMPREPLY=()",
-            }[kind(option)]
-            values.append(f"        {names}) {reply}; return ;;")
-        names = " ".join(name for option in part.options for name in option.names)
-        suffix = "|".join(dict.fromkeys(ending[1:] for ending in part.files))
-        files = [
-            '      COMPREPLY=($(compgen -d -S / -- "$cur"))',
-            f"      COMPREPLY+=($(compgen -f -X '!*.@({suffix})' -- \"$cur\"))",
-        ]
-        cases += [
-            f"    {word})" if command.parts else "    *)",
-            '      case "$prev" in',
-            *values,
-            "      esac",
-            '      if [[ "$cur" == -* ]]; then',
-            f"        COMPREPLY=($(compgen -W '{names}' -- \"$cur\")); return",
-            "      fi",
-            *(files if suffix else []),
-            "      ;;",
-        ]
+        cases += bash_case(part, part.name.split()[-1] if command.parts else "*")
     first = []
     if command.parts:
         words = " ".join(part.name.split()[-1] for part in parts)
@@ -227,6 +196,38 @@ def bash(command: Command) -> str:
             "",
         ]
     )
+
+
+def bash_case(part: Command, word: str) -> list[str]:
+    """What bash offers behind one command."""
+    values = []
+    for option in part.options:
+        if not option.value:
+            continue
+        reply = {
+            "words": f"COMPREPLY=($(compgen -W '{' '.join(option.choices)}' -- \"$cur\"))",
+            "folder": 'COMPREPLY=($(compgen -d -- "$cur"))',
+            "file": 'COMPREPLY=($(compgen -f -- "$cur"))',
+            "any": "COMPREPLY=()",
+        }[kind(option)]
+        values.append(f"        {'|'.join(option.names)}) {reply}; return ;;")
+    names = " ".join(name for option in part.options for name in option.names)
+    suffix = "|".join(dict.fromkeys(ending[1:] for ending in part.files))
+    files = [
+        '      COMPREPLY=($(compgen -d -S / -- "$cur"))',
+        f"      COMPREPLY+=($(compgen -f -X '!*.@({suffix})' -- \"$cur\"))",
+    ]
+    return [
+        f"    {word})",
+        '      case "$prev" in',
+        *values,
+        "      esac",
+        '      if [[ "$cur" == -* ]]; then',
+        f"        COMPREPLY=($(compgen -W '{names}' -- \"$cur\")); return",
+        "      fi",
+        *(files if suffix else []),
+        "      ;;",
+    ]
 
 
 def zsh(command: Command) -> str:

@@ -48,7 +48,8 @@ uninstall() {
 # put MODE FILE NAME: one file, into the list too.
 put() {
   mkdir -p "$root/$(dirname "$3")" || fail "$root cannot be written"
-  cp "$2" "$root/$3" && chmod "$1" "$root/$3" || fail "$root/$3 cannot be written"
+  cp "$2" "$root/$3" || fail "$root/$3 cannot be written"
+  chmod "$1" "$root/$3"
   echo "$3" >> "$work/list"
 }
 
@@ -77,8 +78,9 @@ find_python() {
   echo lib/perigeo/venv >> "$work/list"
   python=$prefix/lib/perigeo/venv/bin/python
   # The package brings its needs; what is called is the copy beside it.
-  "$python" -m pip install --quiet --disable-pip-version-check "./postproc[study,report]" \
-    && "$python" -m pip uninstall --quiet --yes perigeo-post
+  cp -R postproc "$work/source" &&
+    "$python" -m pip install --quiet --disable-pip-version-check "$work/source[study,report]" &&
+    "$python" -m pip uninstall --quiet --yes perigeo-post
 }
 
 install_post() {

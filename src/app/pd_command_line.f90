@@ -84,10 +84,6 @@ contains
     do while (i < command_argument_count())
       i = i + 1
       word = argument(i)
-      if (index(word, '-') /= 1) then
-        call take_input_path(word, options, errors)
-        cycle
-      end if
       call take_apart(word, given)
       select case (word)
       case ('--check')
@@ -118,9 +114,10 @@ contains
       case ('--points')
         call value_of('--points', 'a file', options%points_path)
       case ('--threads')
-        call read_threads(options%threads)
+        call value_of('--threads', 'a whole number', word)
+        call read_threads(word, options%threads, errors)
       case default
-        call report_unknown(word, errors)
+        call take_input_path(word, options, errors)
         cycle
       end select
       if (allocated(given)) call errors%add('the option takes no value', word, '"'//given//'"')
@@ -146,24 +143,25 @@ contains
         call errors%add('a value is missing', option, '"'//value//'"', meaning)
     end subroutine value_of
 
-    subroutine read_threads(threads)
-      integer, intent(out) :: threads
-      integer, parameter   :: most_threads = 4096
-      character(:), allocatable :: value
-      integer :: status
-
-      threads = 0
-      call value_of('--threads', 'a whole number', value)
-      if (value == '') return
-      status = 1
-      if (verify(value, '0123456789') == 0 .and. len(value) < 9) &
-        read (value, *, iostat=status) threads
-      if (status /= 0 .or. threads < 1 .or. threads > most_threads) &
-        call errors%add('the number of threads is wrong', '--threads', '"'//value//'"', &
-          '1 to 4096')
-    end subroutine read_threads
-
   end subroutine read_command_line
+
+  !> The value of --threads; what is missing has been reported.
+  subroutine read_threads(value, threads, errors)
+    character(*),       intent(in)    :: value
+    integer,            intent(out)   :: threads
+    type(error_list_t), intent(inout) :: errors
+    integer, parameter :: most_threads = 4096
+    integer :: status
+
+    threads = 0
+    if (value == '' .or. index(value, '--') == 1) return
+    status = 1
+    if (verify(value, '0123456789') == 0 .and. len(value) < 9) &
+      read (value, *, iostat=status) threads
+    if (status /= 0 .or. threads < 1 .or. threads > most_threads) &
+      call errors%add('the number of threads is wrong', '--threads', '"'//value//'"', &
+      '1 to 4096')
+  end subroutine read_threads
 
   !> An option and the value behind its =, if there is one: --threads=2.
   subroutine take_apart(word, value)
@@ -177,13 +175,15 @@ contains
     word = word(:equals - 1)
   end subroutine take_apart
 
-  !> A word that is no option is the input file.
+  !> A word that is no option is the input file; one that looks like an option is unknown.
   subroutine take_input_path(word, options, errors)
     character(*),       intent(in)    :: word
     type(options_t),    intent(inout) :: options
     type(error_list_t), intent(inout) :: errors
 
-    if (options%input_path /= '') then
+    if (index(word, '-') == 1) then
+      call report_unknown(word, errors)
+    else if (options%input_path /= '') then
       call errors%add('more than one input file is given: '//options%input_path//' and '//word)
     else
       options%input_path = word

@@ -184,12 +184,26 @@ contains
     if (index(line, ';') > 0) then
       what = 'blanks or commas separate the values, not semicolons'
     else if (index(line, '.') == 0 .and. index(line, ',') > 0 .and. verify(line, '0123456789,-+ ') &
-             == 0) then
+             == 0 .or. has_decimal_comma(line)) then
       what = 'the decimal sign is a point, a comma separates values'
     else if (i == 1 .and. verify(line(1:1), '+-.0123456789') > 0) then
       what = 'a heading is no point, it begins with #'
     end if
   end function doubt
+
+  !> Whether there is a comma between two digits in a line that separates values by blanks.
+  pure logical function has_decimal_comma(line) result(found)
+    character(*), intent(in) :: line
+    character(*), parameter :: digits = '0123456789'
+    integer :: k
+
+    found = .false.
+    if (index(trim(line), ' ') == 0) return
+    do k = 2, len_trim(line) - 1
+      found = found .or. (line(k:k) == ',' .and. index(digits, line(k - 1:k - 1)) > 0 &
+        .and. index(digits, line(k + 1:k + 1)) > 0)
+    end do
+  end function has_decimal_comma
 
   !> Extent of the points of the body.
   subroutine measure(path, body, errors)

@@ -119,9 +119,9 @@ contains
     if (is_given(output, 'frame_strains')) call errors%add(unknown, &
       where=place_of(output, 'frame_strains'), allowed='frame_times or frame_count in its place')
     if (input%integration%damping_frame == 'platens' .and. .not. all_moved_later(input)) &
-      call errors%add( &
-      'a platen moves under a traction: its own motion would not be damped', &
-      where=place_of(integration, 'damping_frame'), found='''platens''', allowed='''rest'', or traction_until')
+      call errors%add('a platen moves under a traction: its own motion would not be damped', &
+      where=place_of(integration, 'damping_frame'), found='''platens''', &
+      allowed='''rest'', or traction_until')
   end subroutine check_strains
 
   subroutine check_name(input, k, group, errors)

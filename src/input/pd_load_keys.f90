@@ -90,7 +90,8 @@ contains
       stands_for='1 at all times', also='as many as times; only with affine', &
       meaning='factors on velocity_gradient at these times'), self%factors)
     call visitor%list_key(key_t('traction', count=2, unit='Pa', stands_for='none', &
-      also='in place of a motion, or before it, see traction_until; smooth: 0 along the side; a whole side only, not affine', &
+      also='in place of a motion, or before it: traction_until; smooth: 0 along the side; ' &
+      //'a whole side only, not affine', &
       meaning='force per area that acts on the platen from outside, x and y: the platen moves ' &
       //'under it and stays plane'), self%traction)
     call visitor%real_key(key_t('ramp_time', unit='s', default='0.0', range=not_negative, &

@@ -64,6 +64,7 @@ contains
     type(body_t),       intent(out)   :: body
     type(error_list_t), intent(inout) :: input_errors, errors
     character(64) :: names(size(input%boundaries))
+    character(:), allocatable :: found
     integer :: k
 
     do k = 1, size(names)
@@ -77,10 +78,12 @@ contains
       end if
     end associate
     if (input_errors%count() > 0) return
+    found = 'no such name in column 4 of '
+    if (all(body%boundary == 0)) found = 'no column 4 with names of boundaries in '
     do k = 1, size(names)
       if (.not. any(body%boundary == k)) &
         call errors%add('a boundary holds no point', '&boundary name = '//trim(names(k)), &
-                        'no such name in column 4 of '//trim(input%bodies(1)%file))
+                        found//trim(input%bodies(1)%file))
     end do
   end subroutine cloud_body
 

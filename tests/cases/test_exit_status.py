@@ -150,6 +150,16 @@ def test_a_boundary_without_points_cannot_be_set_up(run_case, tmp_path):
     assert sorted(contents(tmp_path)) == ["cloud.txt", "run.nml"]
 
 
+def test_a_cloud_without_a_fourth_column_is_told(run_case, tmp_path):
+    (tmp_path / "cloud.txt").write_text("\n".join([*GRID, ""]))
+    done = run_case(CLOUD + "&boundary name = 'low', side = 'bottom' /\n", tmp_path)
+    assert "found: no column 4 with names of boundaries in cloud.txt" in done.stderr
+    (tmp_path / "cloud.txt").write_text("\n".join([*GRID[:-1], f"{GRID[-1]} low", ""]))
+    text = CLOUD + "&boundary name = 'low' /\n&boundary name = 'high' /\n"
+    done = run_case(text, tmp_path)
+    assert "found: no such name in column 4 of cloud.txt" in done.stderr
+
+
 def test_a_wrong_line_of_a_point_cloud_is_named(run_case, tmp_path):
     (tmp_path / "cloud.txt").write_text("\n".join([*GRID, "1 2", ""]))
     done = run_case(CLOUD, tmp_path)

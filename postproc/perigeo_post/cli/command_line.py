@@ -21,7 +21,7 @@ from typing import Any, NoReturn
 
 from ..read.errors import PostError
 from ..version import __version__
-from . import band, compare, contours, curves, export, geometry, info, report, study
+from . import advise, band, compare, contours, curves, export, geometry, info, report, study
 from .options import Arguments, check_outputs
 
 
@@ -99,6 +99,14 @@ COMMANDS: dict[str, tuple[_Setup, _Action, str, str]] = {
         perigeo-post export run.h5
         perigeo-post export run.h5 --format csv --strain 1% --field stress plastic_strain
         perigeo-post export run.h5 --format xdmf -o .""",
+    ),
+    "advise": (
+        advise.add_options, advise.carry_out,
+        "an input to start from, for a soil and a size",
+        """\
+        perigeo-post advise --cu 50e3 --eu 30e6 --size 0.05 0.1 > own_test.nml
+        perigeo-post advise --cu 20e3 --sensitivity 4 --slip 0.002 --size 0.05 0.1
+        perigeo-post advise --cu 50e3 --eu 30e6 --kind footing --size 2 --points 10""",
     ),
     "geometry": (
         geometry.add_options, geometry.carry_out,

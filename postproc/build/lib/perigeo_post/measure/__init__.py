@@ -1,1 +1,0 @@
-"""Measure what a result holds: curves, moduli, shear bands, quality."""

@@ -1,1 +1,0 @@
-"""Put all studies on one page and publish its tables."""
