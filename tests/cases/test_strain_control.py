@@ -144,7 +144,9 @@ def test_it_goes_on_from_the_very_step_of_the_change(run_case, tmp_path):
             text = TEST.replace("end_time = 1.25", f"end_time = {end}, time_step = {step}")
             text = text.replace("damping =", "time_step_rule = 'fixed', damping =")
             text = text.replace("until = 0.5", f"until = {0.5 - 0.7 * step}")
-            text = text.replace("times = 0.6, 0.7, velocities_y = 0.0, -0.001", "velocity = 0, -1e-3")
+            text = text.replace(
+                "times = 0.6, 0.7, velocities_y = 0.0, -0.001", "velocity = 0, -1e-3"
+            )
             text = text.replace("frame_count = 3", f"frame_times = {end}, checkpoint_every = 1e9")
             done = run_case(text, folder, "--quiet", *(["--restart"] if k else []))
             assert done.returncode == 0, done.stderr
@@ -159,7 +161,9 @@ def test_it_goes_on_from_the_very_step_of_the_change(run_case, tmp_path):
 
 
 def test_the_change_may_fall_on_a_stage(run_case, tmp_path):
-    stages = "&stage name = 'consolidate', end_time = 0.5 /\n&stage name = 'shear', end_time = 1.25 /"
+    stages = (
+        "&stage name = 'consolidate', end_time = 0.5 /\n&stage name = 'shear', end_time = 1.25 /"
+    )
     text = RESTING.replace("end_time = 1.25, ", "") + stages
     rows = results(run_case, tmp_path, text)
     plain = tmp_path / "plain"
