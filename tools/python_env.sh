@@ -1,6 +1,7 @@
 # Put perigeo-post and what it needs into .venv:  sh tools/python_env.sh run|test|lint|site|view
 #
-#   run   the package, with studies and report     test   also what the tests need
+#   run   the package, with studies and report     test   also what the tests need, and, where it
+#                                                         can be had, what runs a notebook
 #   lint  also the linters                         site   what makes the pages of `make site`
 #   view  what opens the report in a browser
 #
@@ -62,5 +63,12 @@ if ! $venv/bin/python -m pip install --quiet --disable-pip-version-check --retri
 then
   echo "Python: the packages could not be installed (see above; is there a network?)." >&2
   exit 1
+fi
+# The notebook of the tutorials has many packages of its own, and one test.
+if [ "$level" = test ] &&
+    ! $venv/bin/python -m pip install --quiet --disable-pip-version-check --retries 2 \
+      -e './postproc[notebook]'
+then
+  echo "Python: what runs a notebook could not be installed; the test of the notebook is left out."
 fi
 echo "$wanted" > "$stamp"
