@@ -28,7 +28,8 @@ from urllib3.exceptions import HTTPError
 VIEWS = (("desktop", 1280, 900), ("phone", 380, 800))
 PHOTOGRAPHED = {"index.html", "doc/gallery.html", "doc/tutorials/footing.html", "doc/input.html",
                 "doc/limits.html", "modules/pd_law.html", "input/index.html",
-                "doc/material_law.html", "doc/first_footing.html"}  # fmt: skip
+                "doc/material_law.html", "doc/first_footing.html",
+                "doc/coming_from.html"}  # fmt: skip
 # Of the pages of modules these stand for all.
 SAMPLES = ("modules/index.html", "modules/pd_law.html", "modules/pd_command_line.html",
            "python/index.html", "python/perigeo_post.read.run.html", "input/index.html",
@@ -53,13 +54,19 @@ LOOK = """(() => {
     return [255, 255, 255];
   };
   const faint = new Set();
+  const seen = new Set();  // of one kind of element in one place one is enough
   const wide = [];
   for (const e of document.querySelectorAll('body, body *')) {
     const box = e.getBoundingClientRect();
     if (!box.width) continue;
     if (box.right > root.clientWidth + 0.5 &&
         (!e.closest('.box, pre, .skip') || e.matches('.box, pre'))) wide.push(e);
+    const place = e.parentElement;
+    const kind = [e, place, place && place.parentElement].map(
+      x => x ? x.tagName + '.' + x.className : '').join(' ');
+    if (seen.has(kind)) continue;
     if (![...e.childNodes].some(n => n.nodeType === 3 && n.textContent.trim())) continue;
+    seen.add(kind);
     const pair = [light(channels(getComputedStyle(e).color).slice(0, 3)), light(paper(e))];
     const ratio = (Math.max(...pair) + 0.05) / (Math.min(...pair) + 0.05);
     if (ratio < 4.5) faint.add(e.tagName + '.' + e.className + ' ' + ratio.toFixed(1));

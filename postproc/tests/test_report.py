@@ -289,8 +289,8 @@ def test_page_holds_findings_values_runs_and_checks(results: Path) -> None:
     assert "name = 'fig3a_1'" in page.text
     assert "Processor X, 2 cores, Linux x86_64" in page.text
     assert "2026-03-04" in page.text
-    assert page.row("slope <E>")[2:7] == ["50", "50.2", "+0.400 %", "1 %", "ok"]
-    assert page.row("peak")[6] == "FAILED"
+    assert page.row("slope <E>")[2:8] == ["50", "50.2", "+0.2", "0.5", "+0.400 %", "ok"]
+    assert page.row("peak")[7] == "FAILED"
     assert "Printed by make verify, today." in page.text
     assert page.row("Title of fig3a")[1] == "1.26 × 10−4"  # the largest kinetic ratio
     assert page.row("1") == ["1", "5.144 × 107"]  # of the figure

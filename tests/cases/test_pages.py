@@ -1,9 +1,11 @@
 """What pages say agrees with the sources and with the tables that they take numbers from."""
 
+import math
 import re
 from pathlib import Path
 
 import pytest
+from perigeo_post.cli.command_line import main as post
 
 ROOT = Path(__file__).resolve().parents[2]
 DOC = ROOT / "doc"
@@ -91,3 +93,18 @@ def test_keys_that_other_programs_are_compared_with_exist():
     used |= set(re.findall(r"`&\w+ (\w+)`", page))
     assert len(used) > 6
     assert not [key for key in used if f"key_t('{key}'" not in keys]
+
+
+def test_the_first_footing_has_the_load_that_its_page_says(perigeo, tmp_path, capsys):
+    page = (DOC / "first_footing.md").read_text()
+    blocks = re.findall(r"^```fortran\n(.*?)^```", page, re.M | re.S)
+    assert len(blocks) == 1
+    (tmp_path / "my_footing.nml").write_text(blocks[0])
+    done = perigeo(["--threads", "1", "--quiet", tmp_path / "my_footing.nml"], tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert post(["info", str(tmp_path / "results" / "my_footing" / "my_footing.h5")]) == 0
+    said = re.search(r"`(limit load   footing: [\d.]+) kN/m; .*over the last fifth", page)[1]
+    name, load = said.rsplit(" ", 1)
+    found = re.search(rf"{name} ([\d.]+) kN/m", capsys.readouterr().out)[1]
+    assert float(found) == pytest.approx(float(load), abs=0.1)
+    assert float(found) == pytest.approx((2 + math.pi) * 25.0, rel=3e-3)  # Prandtl, half of B

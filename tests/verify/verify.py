@@ -1,8 +1,8 @@
 """Compare computed values with closed forms: `make verify`.
 
 Each case writes namelists, runs the program and reads its results with perigeo_post. The rows are
-printed as a table (quantity, exact, computed, error, tolerance, verdict), and written to
-results/verify/verify.json and verify.md; exit status 1 when one of them fails.
+printed as a table (quantity, reference, computed, difference and tolerance in its unit, verdict),
+and written to results/verify/verify.json and verify.md; exit status 1 when one of them fails.
 
     verify.py [CASE ...]   only these cases (names: verify.py --list)
     verify.py --publish    all cases, and the table into doc/verification.md
@@ -56,6 +56,11 @@ class Row:
     @property
     def error(self) -> float:
         return (self.computed - self.exact) / abs(self.scale or self.exact)
+
+    @property
+    def allowed(self) -> float:
+        """The tolerance in the unit of the row."""
+        return self.tolerance * abs(self.scale or self.exact)
 
     @property
     def passed(self) -> bool:
@@ -805,7 +810,8 @@ CASES: dict[str, Callable[[], list[Row]]] = {
 
 def table(rows: list[Row]) -> list[list[str]]:
     """The rows as text."""
-    lines = [["quantity", "unit", "exact", "computed", "error", "tolerance", "verdict", "from"]]
+    head = "quantity unit reference computed difference tolerance error verdict from"
+    lines = [head.split()]
     for row in rows:
         lines.append(
             [
@@ -813,8 +819,9 @@ def table(rows: list[Row]) -> list[list[str]]:
                 row.unit,
                 f"{row.exact:.5g}",
                 f"{row.computed:.5g}",
+                f"{row.computed - row.exact:+.2g}",
+                f"{row.allowed:.2g}",
                 f"{100.0 * row.error:+.3f} %",
-                f"{100.0 * row.tolerance:.2g} %",
                 "ok" if row.passed else "FAILED",
                 row.source,
             ]

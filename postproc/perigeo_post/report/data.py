@@ -57,8 +57,14 @@ class CheckRow(BaseModel):
     computed: float
     error: float
     tolerance: float
+    scale: float = 0.0  # what error and tolerance refer to; 0: the exact value
     source: Text = ""
     passed: bool = False
+
+    @property
+    def allowed(self) -> float:
+        """The tolerance in the unit of the quantity."""
+        return self.tolerance * abs(self.scale or self.exact)
 
 
 @dataclass(frozen=True)
