@@ -166,7 +166,9 @@ def changes(code: str) -> Iterator[tuple[int, int, str]]:
     if code.lower().startswith("if") and condition_end:
         opening = code.index("(")
         yield opening, condition_end + 1, f"(.not. {code[opening : condition_end + 1]})"
-    if '"' in code:  # a message: only the condition before it
+    call = re.match(r"call\s+(?:[\w%]*%)?(\w+)", code[action:], re.I)
+    silent = call is not None and WITHOUT_NUMBERS.fullmatch(call[1]) is not None
+    if '"' in code or silent:  # a message and the like: only the condition before it
         if '"' in code[:condition_end]:
             return
         code = code[:condition_end]
@@ -178,11 +180,7 @@ def changes(code: str) -> Iterator[tuple[int, int, str]]:
 def dropped(code: str, action: int) -> Iterator[tuple[int, int, str]]:
     """Return the change that leaves out what a statement does, if it can be left out."""
     what = code[action:]
-    call = re.match(r"call\s+(?:[\w%]*%)?(\w+)", what, re.I)
-    if call:
-        if not WITHOUT_NUMBERS.fullmatch(call[1]):
-            yield action, len(code), "continue"
-    elif re.match(r"(return|exit|cycle)\b", what, re.I) or (
+    if re.match(r"(call|return|exit|cycle)\b", what, re.I) or (
         re.match(r"[\w%]+(\([^=]*\)[\w%]*)*\s*=(?!=|>)", what) and not code.startswith("forall")
     ):
         yield action, len(code), "continue"
