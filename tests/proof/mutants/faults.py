@@ -1,7 +1,7 @@
 """Small mechanical faults in Fortran source: where they can be planted, and what they change.
 
-A fault belongs to one statement. Declarations, texts, comments, directives, messages and estimates
-of the memory have none. Calls without an influence on numbers (`WITHOUT_NUMBERS`), or with one only
+A fault belongs to one statement. Declarations, texts, comments, directives, messages, estimates
+of the memory and times of kernels have none. Calls without an influence on numbers (`WITHOUT_NUMBERS`), or with one only
 where there are several ranks, are not dropped: `make test MPI=1` looks at these.
 """
 
@@ -38,7 +38,8 @@ SWAPPED = {
     "abs": "",
     "transpose": "",
 }
-ESTIMATE = re.compile(r"(if\s*\(.*\)\s*)?memory\s*=", re.I)  # of the bytes that arrays take
+# of the bytes that arrays take; times of kernels
+ESTIMATE = re.compile(r"(if\s*\(.*\)\s*)?memory\s*=|if\s*\(timed\)", re.I)
 CALLED = re.compile(rf"(?<![\w%])({'|'.join(SWAPPED)})(?=\()", re.I)
 WORDS = {
     ".and.": (".or.",),
