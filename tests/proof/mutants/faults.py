@@ -1,8 +1,9 @@
 """Small mechanical faults in Fortran source: where they can be planted, and what they change.
 
 A fault belongs to one statement. Declarations, texts, comments, directives, messages, estimates
-of the memory and times of kernels have none. Calls without an influence on numbers (`WITHOUT_NUMBERS`), or with one only
-where there are several ranks, are not dropped: `make test MPI=1` looks at these.
+of the memory and times of kernels have none. Calls without an influence on numbers
+(`WITHOUT_NUMBERS`), or with one only where there are several ranks, are not dropped:
+`make test MPI=1` looks at these.
 """
 
 from __future__ import annotations
