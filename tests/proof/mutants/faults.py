@@ -1,8 +1,9 @@
 """Small mechanical faults in Fortran source: where they can be planted, and what they change.
 
-A fault belongs to one statement. Declarations, texts, comments, directives, messages and estimates
-of the memory have none. Calls without an influence on numbers (`WITHOUT_NUMBERS`), or with one only
-where there are several ranks, are not dropped: `make test MPI=1` looks at these.
+A fault belongs to one statement. Declarations, texts, comments, directives, messages, estimates
+of the memory and times of kernels have none. Calls without an influence on numbers
+(`WITHOUT_NUMBERS`), or with one only where there are several ranks, are not dropped:
+`make test MPI=1` looks at these.
 """
 
 from __future__ import annotations
@@ -38,7 +39,8 @@ SWAPPED = {
     "abs": "",
     "transpose": "",
 }
-ESTIMATE = re.compile(r"(if\s*\(.*\)\s*)?memory\s*=", re.I)  # of the bytes that arrays take
+# of the bytes that arrays take; times of kernels
+ESTIMATE = re.compile(r"(if\s*\(.*\)\s*)?memory\s*=|if\s*\(timed\)", re.I)
 CALLED = re.compile(rf"(?<![\w%])({'|'.join(SWAPPED)})(?=\()", re.I)
 WORDS = {
     ".and.": (".or.",),
@@ -166,7 +168,9 @@ def changes(code: str) -> Iterator[tuple[int, int, str]]:
     if code.lower().startswith("if") and condition_end:
         opening = code.index("(")
         yield opening, condition_end + 1, f"(.not. {code[opening : condition_end + 1]})"
-    if '"' in code:  # a message: only the condition before it
+    call = re.match(r"call\s+(?:[\w%]*%)?(\w+)", code[action:], re.I)
+    silent = call is not None and WITHOUT_NUMBERS.fullmatch(call[1]) is not None
+    if '"' in code or silent:  # a message and the like: only the condition before it
         if '"' in code[:condition_end]:
             return
         code = code[:condition_end]
@@ -178,11 +182,7 @@ def changes(code: str) -> Iterator[tuple[int, int, str]]:
 def dropped(code: str, action: int) -> Iterator[tuple[int, int, str]]:
     """Return the change that leaves out what a statement does, if it can be left out."""
     what = code[action:]
-    call = re.match(r"call\s+(?:[\w%]*%)?(\w+)", what, re.I)
-    if call:
-        if not WITHOUT_NUMBERS.fullmatch(call[1]):
-            yield action, len(code), "continue"
-    elif re.match(r"(return|exit|cycle)\b", what, re.I) or (
+    if re.match(r"(call|return|exit|cycle)\b", what, re.I) or (
         re.match(r"[\w%]+(\([^=]*\)[\w%]*)*\s*=(?!=|>)", what) and not code.startswith("forall")
     ):
         yield action, len(code), "continue"
