@@ -208,7 +208,7 @@ def test_what_goes_beyond_the_paper_holds_or_not() -> None:
         one = finding({"w": "val('w', series='a', m=1)"}, "{w}", *holds)
         found = evaluate(replace(one, paper="", claim="It is so."), ROWS)
         assert found.verdict == word
-        assert found.statement == "Beyond the paper: It is so."
+        assert found.statement == "It is so."
     assert evaluate(one, ROWS).statement == "Paper"
 
 

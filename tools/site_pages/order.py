@@ -22,7 +22,7 @@ GROUPS = {
     "Tutorials": [
         "doc/tutorials/specimen.md",
         "doc/tutorials/biaxial.md",
-        "doc/tutorials/cyclic.md",
+        "doc/tutorials/cyclic_shear.md",
         "doc/tutorials/hole.md",
         "doc/tutorials/footing.md",
         "doc/tutorials/slope.md",
@@ -30,6 +30,7 @@ GROUPS = {
         "doc/tutorials/excavation.md",
         "doc/tutorials/cloud.md",
         "doc/tutorials/study.md",
+        "doc/tutorials/figure.md",
     ],
     "Choose and judge": [
         "doc/own_test.md",
