@@ -14,5 +14,5 @@ if len(sys.argv) != 3:
     sys.exit(__doc__)
 picture = Image.open(sys.argv[1]).convert("RGB")
 picture.thumbnail((WIDEST, picture.height))
-few = picture.quantize(COLOURS, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
+few = picture.quantize(COLOURS, Image.Quantize.MAXCOVERAGE, 3, dither=Image.Dither.NONE)
 few.save(sys.argv[2], optimize=True)
