@@ -194,7 +194,8 @@ help:              ## list the targets
 # ---------------------------------------------------------------------------------- compiling
 # The rest needs the compiler and HDF5, which `make demo` may have to install first.
 ifneq ($(filter-out setup demo demo-quick test debug lint verify layers help clean \
-  distclean figures $(studies) report report-view gallery site site-view bench clouds finite_elements limit_loads,\
+  distclean figures $(studies) report report-view gallery site site-view bench clouds \
+  finite_elements limit_loads,\
   $(or $(MAKECMDGOALS),all)),)
 
 ifeq ($(shell command -v $(firstword $(FC)) 2>/dev/null),)
