@@ -14,8 +14,8 @@ module pd_doubt_list
   public :: doubt_kind_t, doubt_kinds, doubts_t, is_doubtful, kind_number, never
   public :: where_to_read, write_doubt_table
 
-  character(*), parameter :: where_to_read = 'what was warned of: doc/doubts.md; how far numbers '// &
-    'can be trusted: doc/limits.md'
+  character(*), parameter :: where_to_read = 'what was warned of: doc/doubts.md; how far ' &
+    //'numbers can be trusted: doc/limits.md'
 
   !> One kind of doubt.
   type :: doubt_kind_t
