@@ -59,7 +59,8 @@ studies := fig3a fig3b fig4 fig5 seeds horizon loading size softening influence 
   zero_energy equilibrium
 .PHONY: all program objects post debug units demo demo-quick test lint verify \
   layers setup install help clean distclean figures $(studies) \
-  report report-view site bench clouds finite_elements limit_loads
+  report report-view site bench clouds finite_elements limit_loads \
+  fuzz soak sanitize compilers
 .DEFAULT_GOAL := all
 
 help_width := 13
@@ -153,6 +154,28 @@ finite_elements:   ## perigeo beside finite elements (CalculiX, kept curves); PU
 	@$(submake) $(parallel) program
 	@$(venv)/bin/python tests/verify/finite_elements.py $(if $(PUBLISH),--publish)
 
+fuzz:              ## 10,000 mutated inputs, clouds and studies; COUNT=, SEED=, WORKERS=
+	@sh tools/setup.sh test
+	@$(submake) BUILD=debug $(parallel) program
+	@$(venv)/bin/python tests/proof/fuzz/fuzz.py --count $(or $(COUNT),10000) \
+	  --seed $(or $(SEED),1) --workers $(or $(WORKERS),$(cores))
+
+soak:              ## random kills, damaged checkpoints, full disks; MINUTES=20 or KILLS=, SEED=
+	@sh tools/setup.sh test
+	@$(submake) $(parallel) program
+	@$(venv)/bin/python tests/proof/soak/soak.py --minutes $(or $(MINUTES),20) \
+	  $(if $(KILLS),--kills $(KILLS)) --seed $(or $(SEED),1)
+
+sanitize:          ## sanitizers, valgrind, races; PARTS='address races valgrind', SUITES=text
+	@sh tools/setup.sh test
+	@$(submake) BUILD=debug $(parallel) program
+	@MAKE_COMMAND='$(MAKE)' $(venv)/bin/python tests/proof/sanitize/sanitize.py $(PARTS) \
+	  --suites '$(SUITES)'
+
+compilers:         ## build with every gfortran and flang that is there, and say what each can do
+	@sh tools/setup.sh run
+	@sh tests/proof/compilers.sh '$(MAKE)'
+
 bench:             ## measure the speed on this machine; PUBLISH=1: into doc/performance.md
 	@sh tools/setup.sh test
 	@$(submake) $(parallel) program build/opt/bench/machine
@@ -185,7 +208,8 @@ help:              ## list the targets
 # ---------------------------------------------------------------------------------- compiling
 # The rest needs the compiler and HDF5, which `make demo` may have to install first.
 ifneq ($(filter-out setup demo demo-quick test debug lint verify layers help clean \
-  distclean figures $(studies) report report-view site bench clouds finite_elements limit_loads,\
+  distclean figures $(studies) report report-view site bench clouds finite_elements limit_loads \
+  fuzz soak sanitize compilers,\
   $(or $(MAKECMDGOALS),all)),)
 
 ifeq ($(shell command -v $(firstword $(FC)) 2>/dev/null),)
