@@ -66,10 +66,11 @@ build    := build/$(BUILD)$(if $(MPI),-mpi)
 .DELETE_ON_ERROR:
 studies := fig3a fig3b fig4 fig5 seeds horizon loading size softening influence heterogeneity \
   zero_energy equilibrium
-.PHONY: all program objects post debug units demo demo-quick test lint verify \
-  layers setup install uninstall wheel help clean distclean figures $(studies) \
-  report report-view gallery site site-view bench clouds finite_elements limit_loads \
-  mutants
+# Targets that need no compiler, or see to it themselves.
+sets_up := setup uninstall wheel demo demo-quick test debug lint verify layers help clean distclean \
+  figures $(studies) report report-view gallery site site-view bench clouds finite_elements \
+  limit_loads mutants fuzz soak sanitize compilers
+.PHONY: all program objects post units install $(sets_up)
 .DEFAULT_GOAL := all
 
 help_width := 13
@@ -172,6 +173,28 @@ finite_elements:   ## perigeo beside finite elements (CalculiX, kept curves); PU
 	@$(submake) $(parallel) program
 	@$(venv)/bin/python tests/verify/finite_elements.py $(if $(PUBLISH),--publish)
 
+fuzz:              ## 10,000 mutated inputs, clouds and studies; COUNT=, SEED=, WORKERS=
+	@sh tools/setup.sh test
+	@$(submake) BUILD=debug $(parallel) program
+	@$(venv)/bin/python tests/proof/fuzz/fuzz.py --count $(or $(COUNT),10000) \
+	  --seed $(or $(SEED),1) --workers $(or $(WORKERS),$(cores))
+
+soak:              ## random kills, damaged checkpoints, full disks; MINUTES=20 or KILLS=, SEED=
+	@sh tools/setup.sh test
+	@$(submake) $(parallel) program
+	@$(venv)/bin/python tests/proof/soak/soak.py --minutes $(or $(MINUTES),20) \
+	  $(if $(KILLS),--kills $(KILLS)) --seed $(or $(SEED),1)
+
+sanitize:          ## sanitizers, valgrind, races; PARTS='address races valgrind', SUITES=text
+	@sh tools/setup.sh test
+	@$(submake) BUILD=debug $(parallel) program
+	@MAKE_COMMAND='$(MAKE)' $(venv)/bin/python tests/proof/sanitize/sanitize.py $(PARTS) \
+	  --suites '$(SUITES)'
+
+compilers:         ## build with every gfortran and flang that is there, and say what each can do
+	@sh tools/setup.sh run
+	@sh tests/proof/compilers.sh '$(MAKE)'
+
 bench:             ## measure the speed on this machine; PUBLISH=1: into doc/performance.md
 	@sh tools/setup.sh test
 	@$(submake) $(parallel) program build/opt/bench/machine
@@ -223,10 +246,7 @@ help:              ## list the targets
 
 # ---------------------------------------------------------------------------------- compiling
 # The rest needs the compiler and HDF5, which `make demo` may have to install first.
-ifneq ($(filter-out setup uninstall wheel demo demo-quick test debug lint verify layers help clean \
-  distclean figures $(studies) report report-view gallery site site-view bench clouds \
-  finite_elements limit_loads mutants,\
-  $(or $(MAKECMDGOALS),all)),)
+ifneq ($(filter-out $(sets_up),$(or $(MAKECMDGOALS),all)),)
 
 ifeq ($(shell command -v $(firstword $(FC)) 2>/dev/null),)
   $(error no Fortran compiler ($(FC)): `make setup` installs or names what is missing)

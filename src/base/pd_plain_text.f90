@@ -17,18 +17,26 @@ module pd_plain_text
 
 contains
 
-  !> Put blanks in the place of the mark that some editors put before UTF-8 text, and of every
+  !> Put one blank in the place of the mark that some editors put before UTF-8 text, and of every
   !> other kind of blank: no-break, narrow, without width.
   pure subroutine make_plain(text)
     character(:), allocatable, intent(inout) :: text
-    integer :: i, n
+    integer :: i, last, n
 
     i = 1
+    last = 0
     do while (i <= len(text))
       n = letter_length(text, i)
-      if (is_blank(text(i:i + n - 1))) text(i:i + n - 1) = ''
+      if (is_blank(text(i:i + n - 1))) then
+        last = last + 1
+        text(last:last) = ''
+      else
+        text(last + 1:last + n) = text(i:i + n - 1)
+        last = last + n
+      end if
       i = i + n
     end do
+    text = text(:last)
   end subroutine make_plain
 
   pure logical function is_blank(letter)

@@ -65,10 +65,11 @@ contains
     do k = 1, size(bodies)
       if (bodies(k)%role == 'hole') cycle
       if (bodies(k)%shape == 'circle') then   ! exactly
-        vertices = reshape([bodies(k)%x - bodies(k)%radius, bodies(k)%y - bodies(k)%radius, &
-          bodies(k)%x + bodies(k)%radius, bodies(k)%y + bodies(k)%radius], [2, 2])
         known = known .and. is_set(bodies(k)%x) .and. is_set(bodies(k)%y) &
           .and. is_set(bodies(k)%radius)
+        if (.not. known) return
+        vertices = reshape([bodies(k)%x - bodies(k)%radius, bodies(k)%y - bodies(k)%radius, &
+          bodies(k)%x + bodies(k)%radius, bodies(k)%y + bodies(k)%radius], [2, 2])
       else if (bodies(k)%shape == 'file') then
         vertices = reshape([bodies(k)%x_min, bodies(k)%y_min, bodies(k)%x_max, bodies(k)%y_max], &
           [2, 2])

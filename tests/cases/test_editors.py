@@ -25,3 +25,11 @@ def test_inputs_of_all_editors_are_read(run_case, tmp_path, encoding, line_end):
     path.write_bytes(text.replace("\n", line_end).encode(encoding))
     done = run_case(path, tmp_path, "--check")
     assert done.returncode == 0, done.stderr
+
+
+def test_a_blank_that_does_not_break_is_one_blank_in_a_text(run_case, tmp_path):
+    text = VALID.replace("&run name", "&run title = 'Slope\xa0in\u202fclay', name")
+    path = tmp_path / "run.nml"
+    path.write_bytes(text.encode())
+    done = run_case(path, tmp_path, "--print-input")
+    assert "title = 'Slope in clay'" in done.stdout, done.stdout + done.stderr

@@ -17,13 +17,22 @@ def test_a_hole_beyond_counting_is_refused(run_case, tmp_path, hole):
     assert "the hole reaches too far away from the solid bodies" in done.stderr
 
 
+def test_a_circle_of_which_all_is_missing_is_told(run_case, tmp_path):
+    text = SPECIMEN + "&body name = 'bore', shape = 'circle' /\n"
+    done = run_case(text, tmp_path, "--check")
+    assert done.returncode == 2
+    assert "&body radius: the key is missing" in done.stderr
+
+
 LAYOUT = "&discretisation layout = 'cells', volumes = 'tributary',"
 NEEDLE = "&body shape = 'polygon', vertices = 0, 0, 2, 0, 2, 1, 1500, 1.3, 2, 1.5, 2, 2, 0, 2 /"
 
 
 def test_a_needle_of_a_body_is_told(run_case, tmp_path):
     """Thousands of slivers far from any point look for the nearest one."""
-    text = changed(without_group(SPECIMEN, "imperfection"), spacing="0.25", horizon="0.75").replace("&discretisation", LAYOUT)
+    text = changed(without_group(SPECIMEN, "imperfection"), spacing="0.25", horizon="0.75").replace(
+        "&discretisation", LAYOUT
+    )
     text = text.replace("&body x_min = 0.0, x_max = 0.5, y_min = 0.0, y_max = 1.0 /", NEEDLE)
     done = run_case(text, tmp_path, "--check")
     assert done.returncode == 3

@@ -161,7 +161,9 @@ def main():
     last = options.first + options.count
     chunks = [range(n, min(n + CHUNK, last)) for n in range(options.first, last, CHUNK)]
     counts, failed, done = Counter(), 0, 0
-    print(f"{options.count} inputs, seed {options.seed}, {len(world.texts)} to begin from", flush=True)
+    print(
+        f"{options.count} inputs, seed {options.seed}, {len(world.texts)} to begin from", flush=True
+    )
     with ProcessPoolExecutor(options.workers, initializer=verdicts.limit_this_process) as pool:
         waiting = [pool.submit(try_some, world, options.seed, chunk) for chunk in chunks]
         for some in waiting:

@@ -18,8 +18,8 @@ FACTORS = (
     1e6, 1e9, 1e30,
 )  # fmt: skip
 LETTERS = (
-    b"\xe4", "ä".encode(), "\u00a0".encode(), "“".encode(), "’".encode(), "−".encode(), b"\x00",
-    b"\x1b", b"\x7f", b"\xff", b"\xef\xbb\xbf", b"'", b'"', b"/", b"&", b"!", b"=", b",", b"*",
+    b"\xe4", "ä".encode(), "\u00a0".encode(), "\u201c".encode(), "\u2019".encode(), "\u2212".encode(),
+    b"\x00", b"\x1b", b"\x7f", b"\xff", b"\xef\xbb\xbf", b"'", b'"', b"/", b"&", b"!", b"=", b",", b"*",
     b"(", b")", b"%", b"#", b";", b"\t", b"\r", b"\n", b"\r\n", b"\\", b"&end\n", b"/\n&", b" / ",
     "𝛿".encode(), b"''", b"$",
 )  # fmt: skip
@@ -143,7 +143,9 @@ def plausible(random, key):
         return [random.choice(key["choices"])]
     count = key["count"] or random.choice((1, 2, 3, 4, 6, 8))
     if key["type"] == "text":
-        return [random.choice(("clay", "left", "right", "top", "soft", "a", "", "left=soft", "x y"))]
+        return [
+            random.choice(("clay", "left", "right", "top", "soft", "a", "", "left=soft", "x y"))
+        ]
     if key["type"] == "integer":
         return [float(random.choice((0, 1, 2, 3, 10, 1000))) for _ in range(count)]
     values = [random.choice((0.0, 0.1, 0.25, 0.5, 1.0, 2.0, 10.0, 1e3, 1e5)) for _ in range(count)]

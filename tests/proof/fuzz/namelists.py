@@ -7,11 +7,11 @@ import re
 
 NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([ed][+-]?\d+)?", re.I)
 NAME = re.compile(r"[a-z_][a-z0-9_]*", re.I)
-BLANKS = re.compile("[\u00a0\u2000-\u200a\u202f]")  # of word processors
+BLANKS = re.compile("[\u00a0\u2000-\u200b\u202f]")  # of word processors
 PIECE = re.compile(
     r"""(?P<blank>[ \t\r\n]+|![^\r\n]*)
       | (?P<text>'(?:[^'\r\n]|'')*'|"(?:[^"\r\n]|"")*")
-      | &(?P<group>[A-Za-z_][A-Za-z0-9_]*)(?=[\s/!]|$)
+      | &(?P<group>[A-Za-z_][A-Za-z0-9_]*)(?=[\s/!,]|$)
       | (?P<mark>[=,/])
       | (?P<repeat>\d+)\*(?=[-+.\d'"])
       | (?P<word>[^\s,/=!&'"*]+)""",
@@ -56,7 +56,7 @@ def value_of(kind, content):
 
 
 def read(text):
-    """Return the groups of a text: a list of (name, {key: [values]}), all names in small letters."""
+    """Return the groups of a text: (name, {key: [values]}) each, names in small letters."""
     found, groups, at = pieces(text), [], 0
 
     def kind(i):

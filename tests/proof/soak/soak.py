@@ -24,8 +24,8 @@ from xml.etree import ElementTree
 ROOT = Path(__file__).resolve().parents[3]
 sys.path.insert(0, str(ROOT / "tests" / "cases"))
 
-import h5py
-from case_files import groups_of
+import h5py  # noqa: E402
+from case_files import groups_of  # noqa: E402
 
 LIMIT = 120.0  # seconds for one run
 SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGUSR1)
@@ -61,7 +61,7 @@ BLOCKS = """\
 INPUTS = {
     "motion": SPECIMEN.format(control="none", frames=5, rows=200, every="0.01"),
     "motion, rare checkpoints": SPECIMEN.format(
-        control="relaxing", frames=40, rows=1000, every="0.05"
+        control="relaxing", frames=20, rows=500, every="0.05"
     ),
     "motion, no checkpoints": SPECIMEN.format(control="none", frames=5, rows=100, every="0.0"),
     "equilibrium in stages": BLOCKS.format(every="0.01"),
@@ -79,10 +79,13 @@ class Case:
         self.name, self.text = name, text
         folder.mkdir()
         (folder / "run.nml").write_text(text)
-        begin = time.monotonic()
-        subprocess.run([program, "--quiet", "--threads", "1", "run.nml"], cwd=folder, check=True,
-                       stderr=subprocess.DEVNULL)  # fmt: skip
-        self.seconds = time.monotonic() - begin
+        taken = []
+        for _ in range(3):
+            begin = time.monotonic()
+            subprocess.run([program, "--quiet", "--force", "--threads", "1", "run.nml"], cwd=folder,
+                           check=True, stderr=subprocess.DEVNULL)  # fmt: skip
+            taken.append(time.monotonic() - begin)
+        self.seconds = min(taken)
         self.history = (folder / "out" / "case_history.csv").read_bytes()
         self.result = state_of(folder / "out" / "case.h5")
         self.sizes = [path.stat().st_size for path in (folder / "out").iterdir()]
@@ -142,7 +145,7 @@ class Trial:
     def kill(self, process):
         """Send a random signal at a random moment; return whether it hit a living run."""
         number = self.random.choice(SIGNALS)
-        wait = self.random.random() ** 1.5 * 1.1 * self.case.seconds
+        wait = self.random.random() ** 1.5 * self.case.seconds
         time.sleep(wait)
         alive = process.poll() is None
         if alive:
@@ -186,7 +189,7 @@ class Trial:
 def killed(trial):
     """Kill the run, its restart and the restart of that."""
     trial.kill(trial.begin())
-    for _ in range(trial.random.choice((0, 1, 1, 2, 3))):
+    for _ in range(trial.random.choice((0, 1, 2, 3, 5, 8))):
         trial.kill(trial.go_on())
     trial.finish()
 

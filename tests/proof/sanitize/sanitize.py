@@ -1,0 +1,275 @@
+"""Memory, undefined behaviour and races: the program and its unit suites under checkers.
+
+    .venv/bin/python tests/proof/sanitize/sanitize.py [address] [races] [valgrind] [--suites TEXT]
+
+address   sanitizers of addresses and undefined behaviour over the unit suites and tiny runs
+races     ThreadSanitizer with an OpenMP that it understands; races planted on purpose are found
+valgrind  a tiny run of the checking build
+
+`make sanitize` calls this.
+"""
+
+import argparse
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[3]
+sys.path.insert(0, str(ROOT / "tests" / "support"))
+
+from run_tests import TEST_NAME, run_own  # noqa: E402
+
+HERE = Path(__file__).resolve().parent
+TWO_BLOCKS = 0.05  # spacing of bodies with several blocks of 256 rows
+BODY = """\
+&run name = 'case', output_dir = 'out', operators = '{operators}' /
+&discretisation spacing = {spacing}, horizon = {horizon} /
+&body x_min = 0.0, x_max = 1.0, y_min = 0.0, y_max = 2.0 /
+&material model = 'j2', density = 2000.0, youngs_modulus = 50.0e6, poissons_ratio = 0.3
+  yield_stress = 0.15e6, kinematic_modulus = -1.5e6, residual_strength = 15.0e3 /
+&boundary name = 'bottom', side = 'bottom' /
+&boundary name = 'top', side = 'top', contact = 'smooth', velocity = 0.0, -0.1 /
+&pressure name = 'wall', side = 'left', value = 1.0e4, ramp_time = 0.01 /
+&stabilisation method = '{control}' /
+&integration end_time = {end}, damping = 5.0e5{more} /
+&imperfection amplitude = 1.0e-3, x = 0.0, y = 0.5, radius = 0.3 /
+&output frame_count = 2, history_count = 10, checkpoint_every = 1.0e-3 /
+"""
+
+
+def body(operators, control, more="", spacing=0.25, end=0.03):
+    return BODY.format(
+        operators=operators, control=control, more=more, spacing=spacing, horizon=3.01 * spacing,
+        end=end,
+    )  # fmt: skip
+
+
+EQUILIBRIUM = ", method = 'equilibrium', increments = 2, residual = 1.0e-2"
+TINY = {
+    "lattice": body("lattice", "none"),
+    "list, relaxing control": body("list", "relaxing"),
+    "Silling's control": body("list", "silling").replace("'silling'", "'silling', factor = 0.5"),
+    "equilibrium": body("auto", "relaxing", EQUILIBRIUM.replace("method", "\n  method")),
+}
+TINY["equilibrium"] = TINY["equilibrium"].replace(", damping = 5.0e5", "")
+RACING = {
+    "lattice": body("lattice", "none", spacing=TWO_BLOCKS, end=0.004),
+    "list": body("list", "relaxing", spacing=TWO_BLOCKS, end=0.004),
+}
+
+# Races as they happen: a variable that is not private, a range one row too long. The text is in
+# the file once.
+PLANTS = {
+    "a variable is not private": (
+        "src/motion/pd_forces.f90",
+        "    !$omp parallel do schedule(static) default(none) private(block, lo, hi, p) &\n"
+        "    !$omp shared(n_blocks, operators, materials, u, h, state, next)\n",
+        "    !$omp parallel do schedule(static) default(none) private(block, hi, p) &\n"
+        "    !$omp shared(lo, n_blocks, operators, materials, u, h, state, next)\n",
+    ),
+    "blocks overlap by a row": (
+        "src/motion/pd_forces.f90",
+        "        operators%domain%blocks%hi(block), state%displacement, state%force)\n",
+        "        min(operators%domain%blocks%hi(block) + 1, size(state%force, 1)), &\n"
+        "        state%displacement, state%force)\n",
+    ),
+}
+
+
+class Count:
+    passed = failed = 0
+
+    def note(self, what, good, said=""):
+        self.passed += good
+        self.failed += not good
+        print(f"  {'ok    ' if good else 'FAILED'}  {what}", flush=True)
+        if not good:
+            print("\n".join(f"          {line}" for line in said.splitlines()[-40:]), flush=True)
+
+
+def make(folder, flags, *goals, more=()):
+    """Build with some flags in a folder of its own; return whether it worked."""
+    words = [
+        *os.environ.get("MAKE_COMMAND", "make").split(), "--no-print-directory", "BUILD=opt",
+        "MARCH=", "ALIGNED=0", f"FFLAGS={flags}", f"unit_flags={flags}", f"build=build/{folder}",
+        f"program=build/{folder}/perigeo", *more, *goals,
+    ]  # fmt: skip
+    if "-j" not in os.environ.get("MAKEFLAGS", ""):
+        words.append(f"-j{os.cpu_count() or 1}")
+    done = subprocess.run(words, cwd=ROOT, check=False, capture_output=True, text=True,
+                          env={**os.environ, "MAKEFLAGS": ""})  # fmt: skip
+    if done.returncode != 0:
+        print(done.stdout[-2000:], done.stderr[-4000:])
+    return done.returncode == 0
+
+
+def run(words, text, environment, limit=600):
+    """Run a program on an input in a folder of its own; return exit status and what it said."""
+    with tempfile.TemporaryDirectory(prefix="perigeo-sanitize-") as folder:
+        (Path(folder) / "run.nml").write_text(text)
+        done = subprocess.run(
+            [*map(str, words), "run.nml"], cwd=folder, check=False, capture_output=True, text=True,
+            errors="replace", timeout=limit, env={**os.environ, **environment},
+        )  # fmt: skip
+    return done.returncode, done.stdout + done.stderr
+
+
+def restarted(program, text, environment):
+    """Run, stop and go on; return the exit statuses and what was said."""
+    statuses, said = [], ""
+    with tempfile.TemporaryDirectory(prefix="perigeo-sanitize-") as folder:
+        (Path(folder) / "run.nml").write_text(text)
+        for options in ([], ["--restart", "--set", "integration.end_time=0.04"]):
+            done = subprocess.run(
+                [program, *options, "run.nml"], cwd=folder, check=False, capture_output=True,
+                text=True, errors="replace", env={**os.environ, **environment},
+            )  # fmt: skip
+            statuses.append(done.returncode)
+            said += done.stdout + done.stderr
+    return statuses, said
+
+
+# ------------------------------------------------------------------------------------ parts
+
+
+def address(count, suites):
+    """Sanitizers of addresses and undefined behaviour."""
+    flags = (
+        "-O1 -g -fno-omit-frame-pointer -fsanitize=address,undefined "
+        "-fno-sanitize-recover=undefined"
+    )
+    names = [path for path in sorted((ROOT / "tests" / "unit").glob("*/test_*.pf"))
+             if path.stem != "test_pd_memory" and re.search(suites, path.stem)]  # fmt: skip
+    goals = [f"build/sanitize-address/unit/{path.stem}" for path in names]
+    built = make("sanitize-address", flags, "program", *goals)
+    count.note("build with the sanitizers of addresses and undefined behaviour", built)
+    if not built:
+        return
+    # what libraries keep until the end is no leak of ours
+    os.environ["ASAN_OPTIONS"] = "detect_leaks=0:detect_stack_use_after_return=1"
+    os.environ["UBSAN_OPTIONS"] = "print_stacktrace=1"
+    folder = ROOT / "build" / "sanitize-address"
+    for path in names:
+        scratch = folder / f"{path.stem}.run"
+        shutil.rmtree(scratch, ignore_errors=True)
+        scratch.mkdir()
+        passed, failures = run_own(folder / "unit" / path.stem, TEST_NAME.findall(path.read_text()),
+                                   scratch)  # fmt: skip
+        said = "\n".join(f"{f.test} {f.place} " + "\n".join(f.notes) for f in failures)
+        count.note(f"{path.stem}, {passed} tests", not failures and passed > 0, said)
+    program = folder / "perigeo"
+    for name, text in TINY.items():
+        status, said = run([program, "--threads", "2"], text, {})
+        count.note(f"run: {name}", status == 0 and not complains(said), said)
+    statuses, said = restarted(program, TINY["lattice"], {})
+    count.note("run and restart", statuses == [0, 0] and not complains(said), said)
+    status, said = run([program, "--check"], TINY["lattice"].replace("'j2'", "'j3'"), {})
+    count.note("a wrong input", status == 2 and not complains(said), said)
+
+
+def complains(said):
+    return "Sanitizer" in said or "runtime error" in said
+
+
+def races(count, _):
+    """ThreadSanitizer, with regions that start and join threads."""
+    flags = "-O1 -g -fsanitize=thread"
+    folder = ROOT / "build" / "sanitize-races"
+    folder.mkdir(parents=True, exist_ok=True)
+    shim = folder / "threads.o"
+    subprocess.run(
+        ["gcc", "-O1", "-g", "-Wall", "-Wextra", "-fsanitize=thread", "-c", HERE / "threads.c",
+         "-o", shim], check=True,
+    )  # fmt: skip
+    built = make("sanitize-races", flags, "program", more=[f"aligned={shim} -lpthread"])
+    count.note("build with the sanitizer of threads", built)
+    if not built:
+        return
+    program = folder / "perigeo"
+    for name, text in RACING.items():
+        status, said = race_run(program, text)
+        count.note(f"no race: {name}", status == 0 and "ThreadSanitizer" not in said, said)
+    for name, plant in PLANTS.items():
+        planted = plant_in(plant, folder, flags, shim)
+        found = False
+        said = "it could not be built"
+        if planted is not None:
+            status, said = race_run(planted, RACING["list"])
+            found = "ThreadSanitizer: data race" in said and status == 66
+        count.note(f"a race planted on purpose is found: {name}", found, said)
+
+
+def race_run(program, text):
+    # addresses drawn at random may lie where this sanitizer has its own memory
+    still = ["setarch", os.uname().machine, "-R"]
+    if subprocess.run([*still, "true"], check=False, capture_output=True).returncode != 0:
+        still = []
+    # the library of gfortran takes its locks in several orders: no deadlock of one thread
+    options = {"TSAN_OPTIONS": "exitcode=66:detect_deadlocks=0"}
+    return run([*still, program, "--threads", "2"], text, options)
+
+
+def plant_in(plant, folder, flags, shim):
+    """Compile one source with a fault, and link it with the others; return the program."""
+    name, old, new = plant
+    text = (ROOT / name).read_text()
+    if text.count(old) != 1:
+        print(f"  {name} no longer has the text to change")
+        return None
+    with tempfile.TemporaryDirectory(prefix="perigeo-plant-") as scratch:
+        source = Path(scratch) / Path(name).name
+        source.write_text(text.replace(old, new))
+        objects = [path for path in sorted(folder.glob("*.o"))
+                   if path.stem != source.stem and path != shim]  # fmt: skip
+        compile_ = ["gfortran", "-std=f2008", *flags.split(), "-fopenmp", f"-I{folder}",
+                    f"-J{scratch}"]  # fmt: skip
+        planted = folder / "planted"
+        faulty = Path(scratch) / "faulty.o"
+        words = ["sh", "tools/hdf5_flags.sh", "link", "gfortran"]
+        asked = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=True)
+        link = asked.stdout.split()
+        for words in (
+            [*compile_, "-c", source, "-o", faulty],
+            [*compile_, "-o", planted, faulty, *objects, shim, *link, "-lpthread"],
+        ):
+            done = subprocess.run(words, check=False, capture_output=True, text=True)
+            if done.returncode != 0:
+                print(done.stderr[-3000:])
+                return None
+    return planted
+
+
+def valgrind(count, _):
+    """Memory of a tiny run, every load and store."""
+    if shutil.which("valgrind") is None:
+        count.note("valgrind is not there: apt-get install valgrind", False)
+        return
+    program = ROOT / "bin" / "perigeo-debug"
+    words = ["valgrind", "--error-exitcode=99", "--quiet", program, "--threads", "1"]
+    for name in ("lattice", "equilibrium"):
+        text = TINY[name].replace("end_time = 0.03", "end_time = 0.01")
+        status, said = run(words, text, {})
+        count.note(f"valgrind: {name}", status == 0 and "== " not in said, said)
+
+
+PARTS = {"address": address, "races": races, "valgrind": valgrind}
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("parts", nargs="*", choices=[*PARTS, []], default=[])
+    parser.add_argument("--suites", default="", help="only suites whose name has this in it")
+    options = parser.parse_args()
+    count = Count()
+    for part in options.parts or PARTS:
+        PARTS[part](count, options.suites)
+    print(f"{count.passed} passed, {count.failed} failed")
+    return 1 if count.failed or not count.passed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
