@@ -68,8 +68,8 @@ studies := fig3a fig3b fig4 fig5 seeds horizon loading size softening influence 
   zero_energy equilibrium
 # Targets that need no compiler, or see to it themselves.
 sets_up := setup uninstall wheel demo demo-quick test debug lint verify layers help clean \
-  distclean figures $(studies) report report-view gallery site site-view bench clouds finite_elements \
-  limit_loads mutants fuzz soak sanitize compilers
+  distclean figures $(studies) report report-view gallery site site-view bench clouds \
+  finite_elements limit_loads mutants fuzz soak sanitize compilers
 .PHONY: all program objects post units install $(sets_up)
 .DEFAULT_GOAL := all
 
