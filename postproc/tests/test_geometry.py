@@ -16,6 +16,8 @@ point 0.0 -0.1 0.01 clay base
 load crest 0.0 0.0 0.0 -5.0
 load crest 0.1 0.0 0.0 -2.5
 patch imperfection 0.05 0.0 0.02
+probe middle 0.05 0.0
+cut 1 0.05 -0.05 0.05 0.02
 comet halley 1.0
 """
 
@@ -40,7 +42,9 @@ def test_points_and_what_acts_on_them_are_read(points):
     assert model.spacing == pytest.approx(0.1)
     assert model.things["load"]["crest"].sum(axis=0)[2:] == pytest.approx([0.0, -7.5])
     assert model.things["patch"]["imperfection"].shape == (1, 3)
-    assert set(model.things) == {"load", "patch"}, "kinds that are not known are passed over"
+    assert set(model.things) == {"load", "patch", "probe", "cut"}, (
+        "kinds that are not known are passed over"
+    )
 
 
 def test_every_kind_that_is_read_is_drawn():
@@ -52,7 +56,8 @@ def test_the_figure_names_materials_boundaries_and_loads(points, tmp_path):
     figure = geometry_figure(model, "a body")
     words = {text.get_text() for text in figure.legends[0].get_texts()}
     assert words == {"clay, 1 points", "sand, 1 points", "boundary base, 1 points",
-                     "load crest, 0.0075 kN/m", "imperfection"}  # fmt: skip
+                     "load crest, 0.0075 kN/m", "imperfection", "probe middle",
+                     "cut 1"}  # fmt: skip
     axes = figure.axes[0]
     assert axes.get_aspect() == 1.0
     low, high = axes.get_xlim()

@@ -5,6 +5,8 @@
 !>   point X Y VOLUME MATERIAL BOUNDARY      a dash where it belongs to the body
 !>   load NAME X Y FORCE_X FORCE_Y           force at full load [N/m]
 !>   patch NAME X Y RADIUS
+!>   probe NAME X Y                          where it is asked for
+!>   cut NUMBER X1 Y1 X2 Y2
 !>
 !> perigeo-post geometry reads it. A new kind of thing that a model holds is one more kind of line.
 module pd_points_file
@@ -14,7 +16,7 @@ module pd_points_file
   use pd_model, only: model_t
   use pd_own_files, only: keep_inputs_from
   use pd_pressure, only: pressure_t
-  use pd_text, only: number_text
+  use pd_text, only: integer_text, number_text
   implicit none
   private
 
@@ -24,7 +26,7 @@ module pd_points_file
 
 contains
 
-  !> Write the points, loads and patches of a model that is set up.
+  !> Write the points, loads, patches, probes and cuts of a model that is set up.
   !>
   !> Errors: the file cannot be written.
   subroutine write_points(path, input, model, errors)
@@ -46,10 +48,7 @@ contains
       call put(unit, head, good)
       call put_points(unit, input, model, good)
       call put_loads(unit, model, good)
-      associate (flaw => input%imperfection)
-        if (flaw%amplitude > 0.0_wp) call put(unit, 'patch imperfection '// &
-          numbers([flaw%x, flaw%y, flaw%radius]), good)
-      end associate
+      call put_marks(unit, input, good)
       close (unit, iostat=status)
       good = good .and. status == 0
     end if
@@ -121,6 +120,29 @@ contains
       end select
     end do
   end subroutine put_loads
+
+  !> What an input marks in its body.
+  subroutine put_marks(unit, input, good)
+    integer,       intent(in)    :: unit
+    type(input_t), intent(in)    :: input
+    logical,       intent(inout) :: good
+    integer :: k
+
+    associate (flaw => input%imperfection)
+      if (flaw%amplitude > 0.0_wp) call put(unit, 'patch imperfection '// &
+        numbers([flaw%x, flaw%y, flaw%radius]), good)
+    end associate
+    do k = 1, size(input%probes)
+      associate (probe => input%probes(k))
+        call put(unit, 'probe '//probe%name//' '//numbers([probe%x, probe%y]), good)
+      end associate
+    end do
+    do k = 1, size(input%cuts)
+      associate (x => input%cuts(k)%x, y => input%cuts(k)%y)
+        call put(unit, 'cut '//integer_text(k)//' '//numbers([x(1), y(1), x(2), y(2)]), good)
+      end associate
+    end do
+  end subroutine put_marks
 
   !> Numbers with blanks between them.
   pure function numbers(x) result(text)

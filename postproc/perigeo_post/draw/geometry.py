@@ -1,4 +1,4 @@
-"""The body of an input before it is run: points, fictitious points, loads, patches."""
+"""The body of an input before it is run: points, fictitious points, loads, what is marked."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ ARROWS = 25  # of a load, at most
 
 
 def geometry_figure(model: ModelPoints, title: str = "") -> Figure:
-    """Points by material, fictitious points by boundary, loads and patches with their names."""
+    """Points by material, fictitious points by boundary, loads, patches, probes, cuts, by name."""
     low = model.positions.min(axis=0) - model.spacing
     high = model.positions.max(axis=0) + model.spacing
     extent = np.concatenate([low, high])
@@ -118,9 +118,27 @@ def _draw_patch(axes: Axes, name: str, rows: FloatArray, k: int, extent: float) 
     return Line2D([], [], linestyle="--", color=COLOURS[1 + k], label=readable(name))
 
 
+def _draw_probe(axes: Axes, name: str, rows: FloatArray, k: int, extent: float) -> Line2D:
+    """A cross at a probe."""
+    (line,) = axes.plot(
+        *rows.T, marker="x", markersize=7, markeredgewidth=1.6, linestyle="none", zorder=6,
+        color=COLOURS[(2 + k) % len(COLOURS)], label=readable(f"probe {name}"),
+    )  # fmt: skip
+    return line
+
+
+def _draw_cut(axes: Axes, name: str, rows: FloatArray, k: int, extent: float) -> Line2D:
+    """The line of a cut."""
+    (line,) = axes.plot(rows[0, [0, 2]], rows[0, [1, 3]], color="black", linewidth=2.0, zorder=5,
+                        label=f"cut {name}")  # fmt: skip
+    return line
+
+
 # How each kind of line of the file is drawn: name, its rows, number of the name, extent [m].
 # A new kind is an entry here and in read.points_file.NUMBERS.
 THINGS: dict[str, Callable[[Axes, str, FloatArray, int, float], Line2D]] = {
     "load": _draw_load,
     "patch": _draw_patch,
+    "probe": _draw_probe,
+    "cut": _draw_cut,
 }

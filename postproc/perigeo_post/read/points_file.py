@@ -1,4 +1,4 @@
-"""The file that `perigeo --check --points FILE` writes: points, loads and patches of a model."""
+"""The file that `perigeo --check --points FILE` writes: the points of a model, loads, marks."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from .points import FloatArray
 MARK = "# perigeo points 1"
 BODY = "-"  # in place of a boundary
 # What a line holds behind its first word: names, then numbers. A new kind of line is one entry.
-NUMBERS = {"load": 4, "patch": 3}
+NUMBERS = {"load": 4, "patch": 3, "probe": 2, "cut": 4}
 
 
 @dataclass(frozen=True)
