@@ -155,6 +155,15 @@ find_rights() {
   has sudo && sudo -n true 2>/dev/null
 }
 
+# What needs no rights of root comes first; on clusters there are modules.
+show_without_root() {
+  echo "  conda create -n perigeo -c conda-forge gfortran hdf5 make python"
+  echo "  conda activate perigeo"
+  echo "or, on a cluster, modules with the same in them (module avail), such as"
+  echo "  module load gcc hdf5 python"
+  echo "or, as root:"
+}
+
 show_by_hand() {
   echo "To install it, type:"
   case $system in
@@ -175,6 +184,7 @@ show_by_hand() {
       ;;
     *)
       if [ "$(id -u)" = 0 ]; then as_root=; else as_root="sudo "; fi
+      [ "$(id -u)" = 0 ] || show_without_root
       install_commands "$packages" | sed -e 's/^env [^ ]* //' -e 's/ -qq*//' -e "s/^/  $as_root/"
       ;;
   esac

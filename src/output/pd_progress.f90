@@ -30,6 +30,10 @@ module pd_progress
     real(wp) :: strain = 0.0_wp              !! nominal
     real(wp) :: axial_stress = 0.0_wp        !! [Pa]
     real(wp) :: largest_alpha = 0.0_wp
+    !> Without platens: the boundary that has moved most, and along which axis; '': none has.
+    character(24) :: moved = ''
+    real(wp) :: displacement = 0.0_wp        !! of it [m]
+    real(wp) :: force = 0.0_wp               !! on the body, along the same axis [N/m]
   end type status_t
 
   !> Screen and log of a run.
@@ -181,7 +185,7 @@ contains
       text = text//'  strain '//short_number(100.0_wp * status%strain)//' %  stress ' &
         //short_number(1.0e-3_wp * status%axial_stress)//' kPa'
     end if
-    text = text//'  alpha '//short_number(status%largest_alpha)
+    text = text//moved_text(status)//'  alpha '//short_number(status%largest_alpha)
     if (rate > 0.0_wp) then
       text = text//'  '//short_number(rate)//' steps/s  '//time_left(status, rate)//' left'
     end if
@@ -199,11 +203,22 @@ contains
       text = text//'  strain '//short_number(100.0_wp * status%strain)//' %  ' &
         //short_number(1.0e-3_wp * status%axial_stress)//' kPa'
     end if
-    text = text//'  alpha '//short_number(status%largest_alpha)
+    text = text//moved_text(status)//'  alpha '//short_number(status%largest_alpha)
     if (rate > 0.0_wp) then
       text = text//'  '//short_number(rate)//'/s  '//time_left(status, rate)//' left'
     end if
   end function short_text
+
+  !> '  footing y -0.0213 m  51.40 kN/m', with the force on the body.
+  pure function moved_text(status) result(text)
+    type(status_t), intent(in) :: status
+    character(:), allocatable :: text
+
+    text = ''
+    if (status%moved == '') return
+    text = '  '//trim(status%moved)//' '//short_number(status%displacement)//' m  ' &
+      //short_number(1.0e-3_wp * status%force)//' kN/m'
+  end function moved_text
 
   pure function time_left(status, rate) result(text)
     type(status_t), intent(in) :: status

@@ -2,6 +2,7 @@
 !>
 !> The only module that knows both the physics and the output.
 module pd_record
+  use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
   use pd_agreement, only: any_rank
   use pd_changes, only: changes_of, n_change
   use pd_checkpoint, only: checkpoint_t, read_checkpoint, remove_checkpoints, &
@@ -39,6 +40,8 @@ module pd_record
   public :: record_failure, record_progress, record_line, observe_state
   public :: record_doubts, record_quality
   public :: record_tries, save_checkpoint, save_last_checkpoint, load_checkpoint
+
+  character(1), parameter :: axes(2) = ['x', 'y']
 
   !> The open outputs of a run.
   type :: record_t
@@ -277,9 +280,33 @@ contains
       associate (first => model%supports%items(model%platens%first)%support)
         status%axial_stress = first%force(model%platens%axis) / model%platens%width
       end associate
+    else
+      call find_moved(model, record%seen, status)
     end if
     call show_progress(record%progress, status, errors)
   end subroutine record_progress
+
+  !> The boundary that has moved most at the last row, and the axis along which it has.
+  pure subroutine find_moved(model, seen, status)
+    type(model_t),       intent(in)    :: model
+    type(observation_t), intent(in)    :: seen
+    type(status_t),      intent(inout) :: status
+    real(wp) :: way
+    integer  :: c, k
+
+    do k = 1, size(model%supports%items)
+      associate (name => model%supports%items(k)%support%name)
+        do c = 1, 2
+          way = seen%value(name//'_displacement_'//axes(c))
+          if (ieee_is_nan(way)) cycle   ! it has no such column
+          if (abs(way) <= abs(status%displacement)) cycle
+          status%moved = name(:min(len(name), len(status%moved) - 2))//' '//axes(c)
+          status%displacement = way
+          status%force = seen%value(name//'_force_'//axes(c))
+        end do
+      end associate
+    end do
+  end subroutine find_moved
 
   !> A line on the screen and in the log.
   subroutine record_line(record, text, errors)
