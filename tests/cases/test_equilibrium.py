@@ -48,6 +48,24 @@ def test_every_row_is_at_rest_and_has_its_energy(rows):
     assert not run["damping_share"].any()
 
 
+def test_a_load_that_grows_does_the_work_that_is_stored(rows):
+    run = rows("""\
+&run name = 'case', output_dir = 'out' /
+&discretisation spacing = 0.1, horizon = 0.25, volumes = 'tributary' /
+&body x_min = 0.0, x_max = 0.5, y_min = 0.0, y_max = 1.0 /
+&material model = 'elastic', strain_measure = 'small', density = 2000.0, youngs_modulus = 50.0e6
+  poissons_ratio = 0.3 /
+&boundary name = 'bottom', side = 'bottom' /
+&pressure name = 'top', side = 'top', value = 1.0e4, ramp_time = 1.0 /
+&integration method = 'equilibrium', end_time = 1.0, increments = 4, residual = 1.0e-8 /
+&output history_count = 4, frame_count = 1 /
+""")
+    # Clapeyron: half of the load times the displacement, about F^2 height (1 - nu^2) / (2 E width)
+    about = 5.0e3**2 * 1.0 * (1.0 - 0.3**2) / (2.0 * 50.0e6 * WIDTH)
+    assert run["external_work"][-1] == pytest.approx(about, rel=0.2)  # a coarse body is softer
+    assert run["strain_energy"] == pytest.approx(run["external_work"], rel=1e-5)
+
+
 def test_frames_lie_where_they_were_asked_for(rows, tmp_path):
     rows(RESTING)
     with h5py.File(tmp_path / "out" / "case.h5", locking=False) as file:
