@@ -20,6 +20,7 @@ GROUPS = {
         "doc/coming_from.md",
     ],
     "Tutorials": [
+        "doc/tutorials/README.md",
         "doc/tutorials/specimen.md",
         "doc/tutorials/biaxial.md",
         "doc/tutorials/cyclic_shear.md",
@@ -31,6 +32,7 @@ GROUPS = {
         "doc/tutorials/cloud.md",
         "doc/tutorials/study.md",
         "doc/tutorials/figure.md",
+        "doc/tutorials/figure.ipynb",
     ],
     "Choose and judge": [
         "doc/own_test.md",

@@ -122,9 +122,10 @@ def _mark(ax: Axes, curve: Curve, marks: Sequence[float]) -> None:
         x = curve.toward(strain)
         y = curve.at(x) * factor
         ax.plot([100.0 * x], [y], "o", color="black", zorder=5)
+        at_end = abs(x - curve.x[0]) > 0.9 * float(np.ptp(curve.x))
         ax.annotate(
-            f"{100.0 * strain:g} %", (100.0 * x, y), xytext=(3, 3),
-            textcoords="offset points", fontsize=7,
+            f"{100.0 * strain:g} %", (100.0 * x, y), xytext=(0, 4) if at_end else (3, 3),
+            textcoords="offset points", fontsize=7, ha="center" if at_end else "left",
         )  # fmt: skip
 
 
