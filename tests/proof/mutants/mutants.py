@@ -234,7 +234,7 @@ def main() -> int:
     else:
         jobs = [[fault] for fault in find(earlier, faults)]
         for path, lists in faults.items():
-            queue = queue_of(lists, chance)
+            queue = [f for f in queue_of(lists, chance) if f.key not in earlier]
             jobs += [queue] * parts[path]
     with ThreadPoolExecutor(max_workers=len(search.free)) as pool:
         for job in [pool.submit(search.draw, queue) for queue in jobs]:
