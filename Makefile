@@ -59,7 +59,8 @@ studies := fig3a fig3b fig4 fig5 seeds horizon loading size softening influence 
   zero_energy equilibrium
 .PHONY: all program objects post debug units demo demo-quick test lint verify \
   layers setup install help clean distclean figures $(studies) \
-  report report-view site bench clouds finite_elements limit_loads
+  report report-view site bench clouds finite_elements limit_loads \
+  test_ranks scaling
 .DEFAULT_GOAL := all
 
 help_width := 13
@@ -119,6 +120,12 @@ test:              ## set-up, build and the whole test suite; BUILD=debug: with 
 	  $(submake) $(parallel) program)
 	@$(venv)/bin/python tests/support/run_tests.py --make '$(MAKE) MPI=' --build $(BUILD)
 
+test_ranks:        ## the tests with several ranks alone, after installing Open MPI if need be
+	@sh tools/setup.sh test
+	@sh tools/setup.sh mpi
+	@$(submake) $(parallel) program && $(submake) MPI=1 $(parallel) program
+	@$(venv)/bin/python -m pytest -q tests/cases/test_ranks.py
+
 debug:             ## build bin/perigeo-debug, which checks bounds and traps invalid numbers
 	@$(submake) BUILD=debug program
 
@@ -159,6 +166,12 @@ bench:             ## measure the speed on this machine; PUBLISH=1: into doc/per
 	@$(submake) $(parallel) ALIGNED=0 build=build/unaligned program=build/unaligned/perigeo program
 	@$(venv)/bin/python tests/bench/bench.py $(if $(PUBLISH),--publish)
 
+scaling:           ## predicted efficiency of many ranks; PUBLISH=1: into doc/parallel.md
+	@sh tools/setup.sh test
+	@sh tools/setup.sh mpi
+	@$(submake) MPI=1 $(parallel) program
+	@$(venv)/bin/python tests/bench/scaling.py $(if $(PUBLISH),--publish) $(if $(MEASURE),--measure)
+
 install: program   ## copy the program to PREFIX/bin (PREFIX=/usr/local)
 	mkdir -p '$(DESTDIR)$(PREFIX)/bin'
 	cp $(program) '$(DESTDIR)$(PREFIX)/bin/'
@@ -185,8 +198,8 @@ help:              ## list the targets
 # ---------------------------------------------------------------------------------- compiling
 # The rest needs the compiler and HDF5, which `make demo` may have to install first.
 ifneq ($(filter-out setup demo demo-quick test debug lint verify layers help clean \
-  distclean figures $(studies) report report-view site bench clouds finite_elements limit_loads,\
-  $(or $(MAKECMDGOALS),all)),)
+  distclean figures $(studies) report report-view site bench clouds finite_elements limit_loads \
+  test_ranks scaling,$(or $(MAKECMDGOALS),all)),)
 
 ifeq ($(shell command -v $(firstword $(FC)) 2>/dev/null),)
   $(error no Fortran compiler ($(FC)): run tools/setup.sh, which installs or names what is missing)
