@@ -69,7 +69,8 @@ studies := fig3a fig3b fig4 fig5 seeds horizon loading size softening influence 
 # Targets that need no compiler, or see to it themselves.
 sets_up := setup uninstall wheel demo demo-quick test debug lint verify layers help clean \
   distclean figures $(studies) report report-view gallery site site-view bench clouds \
-  finite_elements limit_loads mutants fuzz soak sanitize compilers
+  finite_elements limit_loads mutants fuzz soak sanitize compilers \
+  test_ranks scaling
 .PHONY: all program objects post units install $(sets_up)
 .DEFAULT_GOAL := all
 
@@ -129,6 +130,12 @@ test:              ## set-up, build and the whole test suite; BUILD=debug: with 
 	@$(if $(MPI),sh tools/setup.sh mpi && $(submake) MPI= $(parallel) program && \
 	  $(submake) $(parallel) program)
 	@$(venv)/bin/python tests/support/run_tests.py --make '$(MAKE) MPI=' --build $(BUILD)
+
+test_ranks:        ## the tests with several ranks alone, after installing Open MPI if need be
+	@sh tools/setup.sh test
+	@sh tools/setup.sh mpi
+	@$(submake) $(parallel) program && $(submake) MPI=1 $(parallel) program
+	@$(venv)/bin/python -m pytest -q tests/cases/test_ranks.py
 
 debug:             ## build bin/perigeo-debug, which checks bounds and traps invalid numbers
 	@$(submake) BUILD=debug program
@@ -200,6 +207,12 @@ bench:             ## measure the speed on this machine; PUBLISH=1: into doc/per
 	@$(submake) $(parallel) program build/opt/bench/machine
 	@$(submake) $(parallel) ALIGNED=0 build=build/unaligned program=build/unaligned/perigeo program
 	@$(venv)/bin/python tests/bench/bench.py $(if $(PUBLISH),--publish)
+
+scaling:           ## predicted efficiency of many ranks; PUBLISH=1: into doc/parallel.md
+	@sh tools/setup.sh test
+	@sh tools/setup.sh mpi
+	@$(submake) MPI=1 $(parallel) program
+	@$(venv)/bin/python tests/bench/scaling.py $(if $(PUBLISH),--publish) $(if $(MEASURE),--measure)
 
 mutants:           ## plant faults in the physics, one at a time: do the tests notice? COUNT= SEED=
 	@sh tools/setup.sh test

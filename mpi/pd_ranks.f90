@@ -8,7 +8,7 @@ module pd_ranks
   use, intrinsic :: iso_fortran_env, only: error_unit, output_unit
   use mpi_f08, only: mpi_abort, mpi_allgatherv, mpi_allreduce, mpi_bcast, mpi_bor, &
     mpi_comm_rank, mpi_comm_size, mpi_comm_world, mpi_double_precision, mpi_finalize, &
-    mpi_gatherv, mpi_in_place, mpi_init_thread, mpi_integer, mpi_integer8, mpi_irecv, mpi_isend, &
+    mpi_in_place, mpi_init_thread, mpi_integer, mpi_integer8, mpi_irecv, mpi_isend, &
     mpi_max, mpi_min, mpi_recv, mpi_request, mpi_send, mpi_status_ignore, mpi_statuses_ignore, &
     mpi_thread_funneled, mpi_waitall
   use pd_kinds, only: wp
@@ -30,11 +30,12 @@ module pd_ranks
     procedure :: smallest
     procedure :: lowest_number
     procedure :: gathered
+    procedure :: gathered_rows
     procedure :: largest_numbers
     procedure :: fill_in
     procedure :: swap
-    procedure :: collect
     procedure :: spread_out
+    procedure :: hand_over
   end type ranks_t
 
   integer, parameter :: any_tag = 0
@@ -139,6 +140,24 @@ contains
     end associate
   end function gathered
 
+  !> The same of several numbers per block.
+  function gathered_rows(self, parts) result(all_parts)
+    class(ranks_t), intent(in) :: self
+    real(wp),       intent(in) :: parts(:, :)   !! (numbers, blocks of this rank)
+    real(wp), allocatable :: all_parts(:, :), own(:, :)
+
+    if (.not. allocated(self%before)) then
+      all_parts = parts
+      return
+    end if
+    associate (ends => size(parts, 1) * self%before)
+      own = parts
+      allocate (all_parts(size(parts, 1), self%before(self%count)))
+      call mpi_allgatherv(own, size(own), mpi_double_precision, all_parts, &
+        ends(2:) - ends(:self%count), ends(:self%count), mpi_double_precision, mpi_comm_world)
+    end associate
+  end function gathered_rows
+
   !> The largest of every number on any rank.
   subroutine largest_numbers(self, numbers)
     class(ranks_t), intent(in)    :: self
@@ -188,29 +207,20 @@ contains
     call mpi_waitall(n, requests(:n), mpi_statuses_ignore)
   end subroutine swap
 
-  !> Columns of an array of which each is known to one rank, made known to rank 0.
-  subroutine collect(self, values, ends)
+  !> What one rank has, made known to rank 0.
+  subroutine hand_over(self, from, values)
     class(ranks_t), intent(in) :: self
+    integer,        intent(in) :: from   !! the rank
     real(wp), intent(inout), contiguous :: values(:, :)
-    integer,  intent(in) :: ends(0:)   !! last column of each rank; ends(0): those before the first
-    integer :: width, mine
 
-    if (self%count == 1) return
-    width = size(values, 1)
-    mine = self%mine
-    associate (counts => width * (ends(1:) - ends(:self%count - 1)))
-      if (mine == 0) then
-        call mpi_gatherv(mpi_in_place, 0, mpi_double_precision, values, counts, &
-          width * ends(:self%count - 1), mpi_double_precision, 0, mpi_comm_world)
-      else
-        call mpi_gatherv(values(:, ends(mine) + 1:ends(mine + 1)), counts(mine + 1), &
-          mpi_double_precision, values, counts, width * ends(:self%count - 1), &
-          mpi_double_precision, 0, mpi_comm_world)
-      end if
-    end associate
-  end subroutine collect
+    if (from == 0 .or. size(values) == 0) return
+    if (self%mine == from) call mpi_send(values, size(values), mpi_double_precision, 0, any_tag, &
+      mpi_comm_world)
+    if (self%mine == 0) call mpi_recv(values, size(values), mpi_double_precision, from, any_tag, &
+      mpi_comm_world, mpi_status_ignore)
+  end subroutine hand_over
 
-  !> The same, made known to all ranks.
+  !> Columns of an array of which each is known to one rank, made known to all.
   subroutine spread_out(self, values, ends)
     class(ranks_t), intent(in) :: self
     real(wp), intent(inout), contiguous :: values(:, :)

@@ -3,20 +3,22 @@ module pd_check
   use, intrinsic :: iso_fortran_env, only: output_unit
   use omp_lib, only: omp_get_max_threads, omp_set_num_threads
   use pd_command_line, only: options_t, print_help, read_command_line
-  use pd_division, only: share_t, shares
+  use pd_division, only: share_t, shares, traffic, traffic_t
   use pd_doubt_list, only: write_doubt_table
   use pd_errors, only: error_list_t, exit_command_line, exit_file, exit_input, exit_ok, outcome_t
   use pd_input, only: print_input
   use pd_input_reference, only: write_input_reference, write_input_reference_json
   use pd_input_types, only: all_keys
   use pd_kinds, only: wp
+  use pd_model, only: model_t
   use pd_points_file, only: write_points
   use pd_ranks, only: begin_ranks, ranks_t
   use pd_room, only: machine_memory
   use pd_run, only: run_t
+  use pd_setup, only: looks_near
   use pd_size, only: memory_in_words
   use pd_stability, only: find_highest_frequency
-  use pd_summary, only: estimated_seconds, memory_of_run, summarise, summary_t
+  use pd_summary, only: estimated_seconds, memory_of_run, seconds_of_step, summarise, summary_t
   use pd_text, only: integer_text, short_number
   use pd_threads, only: choose_threads, words_on_cores
   use pd_version, only: code_version, git_hash
@@ -24,6 +26,9 @@ module pd_check
   private
 
   public :: begin_program, print_check
+
+  !> Memory that a rank needs for every point of the whole body: row and boundary [bytes].
+  real(wp), parameter :: of_point = 12.0_wp
 
 contains
 
@@ -110,24 +115,74 @@ contains
     call outcome%end_with(exit_ok)
   end subroutine print_check
 
-  !> What the ranks would have: points, and the halo that they exchange twice per step.
+  !> What the ranks would have: points, the halo, memory, and what goes between them in every step.
   subroutine print_shares(run)
-    type(run_t), intent(in) :: run
+    type(run_t), intent(inout) :: run
     type(share_t) :: of_rank(run%ranks%count)
+    type(traffic_t) :: sent
+    real(wp) :: balance
+    integer  :: halo, others
 
     of_rank = shares(run%model, size(of_rank))
-    write (output_unit, '(a)') '  ranks               '//integer_text(size(of_rank))//': '// &
-      integer_text(minval(of_rank%points))//' to '//integer_text(maxval(of_rank%points))// &
-      ' points each, balance '//short_number(sum(real(of_rank%points, wp)) &
-      / (real(size(of_rank), wp) * real(maxval(of_rank%points), wp)))
-    write (output_unit, '(a)') '  halo                '//integer_text(maxval(of_rank%halo))// &
-      ' rows of other ranks at most, '//short_number(maxval(real(of_rank%halo, wp) &
-      / real(max(1, of_rank%rows), wp)))//' of the own ones; displacement and force tensor, '// &
-      short_number(48.0e-3_wp * real(maxval(of_rank%halo), wp))//' kB per step'
-    write (output_unit, '(a)') '  set-up              that of the whole body, by every rank'
-    if (words_on_cores(run%ranks%count) /= '') &
-      write (output_unit, '(a)') '  cores               '//words_on_cores(run%ranks%count)
+    sent = traffic(run%model)
+    halo = maxval(of_rank%halo)
+    others = maxval(of_rank%others)
+    balance = sum(real(of_rank%points, wp)) / (real(size(of_rank), wp) &
+      * real(maxval(of_rank%points), wp))
+    call line('ranks', integer_text(size(of_rank))//': '//integer_text(minval(of_rank%points))// &
+      ' to '//integer_text(maxval(of_rank%points))//' points each, balance '// &
+      short_number(balance))
+    call line('halo', integer_text(halo)//' rows of other ranks at most, '// &
+      short_number(maxval(real(of_rank%halo, wp) / real(max(1, of_rank%rows), wp)))// &
+      ' of the own ones')
+    call line('messages', integer_text(sent%exchanges * others)//' per step and rank with '// &
+      integer_text(8 * sent%numbers * halo)//' bytes, and '//integer_text(sent%reductions)// &
+      ' reductions of '//integer_text(sent%reduced)//' bytes')
+    if (.not. run%model%at_equilibrium) call line('efficiency', 'about '//short_number( &
+      efficiency(run%model, of_rank, sent))//' with 2e-6 s and 1e10 bytes/s per message')
+    associate (part => real(maxval(of_rank%rows + of_rank%halo), wp) / run%model%operators%n)
+      call line('memory of a rank', short_number(1.0e-6_wp * (part &
+        * memory_of_run(run%input, run%model) + of_point * run%model%body%n))//' MB at most')
+    end associate
+    if (.not. set_up_in_parts(run)) call line('set-up', 'that of the whole body, by every rank')
+    if (words_on_cores(run%ranks%count) /= '') call line('cores', words_on_cores(run%ranks%count))
   end subroutine print_shares
+
+  !> 'label  text'.
+  subroutine line(label, text)
+    character(*), intent(in) :: label, text
+    character(20) :: column
+
+    column = label
+    write (output_unit, '(a)') '  '//column//text
+  end subroutine line
+
+  !> Whether every rank sets up its own rows of the model only.
+  logical function set_up_in_parts(run)
+    type(run_t), intent(in) :: run
+
+    set_up_in_parts = allocated(run%model%body%place) .and. run%model%operators%hidden_bonds == 0 &
+      .and. run%input%run%operators /= 'list'
+    if (set_up_in_parts) set_up_in_parts = looks_near(run%input, run%model)
+  end function set_up_in_parts
+
+  !> Time of a step without messages, all ranks being equal, over that of the rank with most points.
+  real(wp) function efficiency(model, of_rank, sent)
+    type(model_t),   intent(inout) :: model
+    type(share_t),   intent(in)    :: of_rank(:)
+    type(traffic_t), intent(in)    :: sent
+    real(wp), parameter :: latency = 2.0e-6_wp     !! of a message [s]
+    real(wp), parameter :: bandwidth = 1.0e10_wp   !! of a rank [bytes/s]
+    real(wp) :: alone, largest, messages
+
+    alone = seconds_of_step(model)
+    largest = alone * real(maxval(of_rank%points), wp) / sum(real(of_rank%points, wp))
+    messages = latency * real(sent%exchanges * maxval(of_rank%others), wp) + 8.0_wp &
+      * real(sent%numbers, wp) * real(maxval(of_rank%halo), wp) / bandwidth &
+      + 2.0_wp * latency * real(sent%reductions * ceiling(log(real(size(of_rank), wp)) &
+      / log(2.0_wp)), wp) + 2.0_wp * real(sent%reduced, wp) / bandwidth
+    efficiency = alone / real(size(of_rank), wp) / (largest + messages)
+  end function efficiency
 
   !> Last line of --check.
   subroutine print_estimate(seconds)

@@ -19,7 +19,7 @@ module pd_run
   use pd_kinds, only: is_set, wp
   use pd_ledger, only: ledger_t, new_ledger
   use pd_lock, only: lock_holder, lock_t, take_lock
-  use pd_model, only: model_t, release_set_up, start
+  use pd_model, only: model_t, release_points, release_set_up, start
   use pd_observe, only: column_t, moment_at, observation_t, observe
   use pd_own_files, only: keep_inputs, lock_path
   use pd_plausibility, only: look_at_model, look_at_motion
@@ -104,7 +104,12 @@ contains
     call compare_points(run%checkpoint, run%model, run%input%path, errors)
     call outcome%end_if_any(errors, exit_input)
     if (outcome%done) return
-    call set_up_model(run%input, run%model, errors, run%stages(run%checkpoint%clock%stage))
+    if (options%check) then   ! rank 0 tells of the whole model
+      call set_up_model(run%input, run%model, errors, run%stages(run%checkpoint%clock%stage))
+    else
+      call set_up_model(run%input, run%model, errors, run%stages(run%checkpoint%clock%stage), &
+        run%ranks)
+    end if
     call try_later_stages(run, options%check, errors)
     call outcome%end_if_any(errors, exit_model)
     if (outcome%done) return
@@ -142,6 +147,7 @@ contains
     call outcome%agree(run%ranks)
     if (outcome%done) return
     call run%ranks%largest_numbers(run%doubts%step)   ! what has been told is not looked at again
+    call release_points(run%model%body)
     call divide_model(run%ranks, run%model)
   end subroutine divide_run
 

@@ -134,12 +134,16 @@ contains
     type(outcome_t), intent(inout) :: outcome
     type(error_list_t) :: errors, file_errors
     character(:), allocatable :: where
+    real(wp) :: x(2)
 
-    associate (x => run%model%points%position)
+    associate (blocks => run%model%blocks)
+      x = 0.0_wp
+      if (row >= blocks%first .and. row <= blocks%last) x = run%model%points%position(row, :)
+      call blocks%ranks%fill_in(x)
       where = 'step '//integer_text(run%clock%step)//', time '//short_number(run%clock%time())// &
         ' s, point '//integer_text(run%model%operators%storage%point_at(row))//' at ('// &
-        coordinate_text(x(row, 1), run%model%spacing)//', '// &
-        coordinate_text(x(row, 2), run%model%spacing)//') m'
+        coordinate_text(x(1), run%model%spacing)//', '// &
+        coordinate_text(x(2), run%model%spacing)//') m'
     end associate
     call record_failure(run%model, run%state, run%clock, run%record, file_errors)
     call record_line(run%record, 'the calculation failed: '//reason//'; '//where//'; '// &

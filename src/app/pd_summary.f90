@@ -17,7 +17,7 @@ module pd_summary
   implicit none
   private
 
-  public :: summary_t, summarise, estimated_seconds, memory_of_run
+  public :: seconds_of_step, summary_t, summarise, estimated_seconds, memory_of_run
 
   integer, parameter :: line_length = 540   !! the longest title fits
 
@@ -301,13 +301,23 @@ contains
   real(wp) function estimated_seconds(model, schedule) result(seconds)
     type(model_t),    intent(inout) :: model
     type(schedule_t), intent(in) :: schedule
-    !> A step with radial return, motion and energies against one with the linear operator.
-    real(wp), parameter :: whole_step = 1.5_wp
     !> Evaluations of the forces that an increment takes until it is at rest, in soil that softens.
     real(wp), parameter :: moves = 300.0_wp
-    integer,  parameter :: repetitions = 5
     !> Opening, closing and describing a frame [s]; bytes that a disk takes in a second.
     real(wp), parameter :: per_frame = 1.5e-3_wp, per_second = 3.0e8_wp
+
+    seconds = seconds_of_step(model) * real(schedule%steps, wp)
+    if (model%at_equilibrium) seconds = seconds * moves
+    seconds = seconds + real(size(schedule%frame_steps) + 1, wp) * per_frame &
+      + frames_on_disk(model, schedule) / per_second
+  end function estimated_seconds
+
+  !> Estimated wall clock time of a step [s].
+  real(wp) function seconds_of_step(model) result(seconds)
+    type(model_t), intent(inout) :: model
+    !> A step with radial return, motion and energies against one with the linear operator.
+    real(wp), parameter :: whole_step = 1.5_wp
+    integer,  parameter :: repetitions = 5
     real(wp), allocatable :: u(:, :), h(:, :), f(:, :)
     integer(int64) :: start, finish, rate
     integer :: k
@@ -321,10 +331,7 @@ contains
       call system_clock(finish)
       seconds = min(seconds, real(finish - start, wp) / real(rate, wp))
     end do
-    seconds = whole_step * seconds * real(schedule%steps, wp)
-    if (model%at_equilibrium) seconds = seconds * moves
-    seconds = seconds + real(size(schedule%frame_steps) + 1, wp) * per_frame &
-      + frames_on_disk(model, schedule) / per_second
-  end function estimated_seconds
+    seconds = whole_step * seconds
+  end function seconds_of_step
 
 end module pd_summary

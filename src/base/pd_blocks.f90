@@ -29,6 +29,7 @@ module pd_blocks
     procedure :: has_first
     procedure :: spread_rows
     procedure :: total
+    procedure :: totals
     procedure :: running_total
     procedure :: largest
     procedure :: smallest
@@ -129,6 +130,20 @@ contains
 
     total = self%ranks%total(parts)
   end function total
+
+  !> Sums of several numbers over all blocks, in their order: one message for all of them.
+  function totals(self, parts)
+    class(blocks_t), intent(in) :: self
+    real(wp),        intent(in) :: parts(:, :)   !! (numbers, blocks)
+    real(wp) :: totals(size(parts, 1))
+    real(wp), allocatable :: all_parts(:, :)
+    integer :: k
+
+    allocate (all_parts, source=self%ranks%gathered_rows(parts))
+    do k = 1, size(totals)
+      totals(k) = sum(all_parts(k, :))
+    end do
+  end function totals
 
   !> Sum over all rows of all blocks, row by row.
   real(wp) function running_total(self, terms)

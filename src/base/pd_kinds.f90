@@ -1,14 +1,19 @@
 !> Working precision and the constants that everything shares.
 module pd_kinds
-  use, intrinsic :: iso_fortran_env, only: int64, real64
+  use, intrinsic :: iso_c_binding, only: c_bool
+  use, intrinsic :: iso_fortran_env, only: int64, int8, real64
   implicit none
   private
 
-  public :: wp, i8, pi, unset, is_set, n_block, n_line, block_sum, block_dot
+  public :: wp, i8, i1, l1, pi, unset, is_set, n_block, n_line, block_sum, block_dot
   public :: ordered_sum
 
   integer, parameter :: wp = real64
   integer, parameter :: i8 = int64
+
+  !> For what there is one of per place, and large bodies have many: numbers and flags of one byte.
+  integer, parameter :: i1 = int8
+  integer, parameter :: l1 = c_bool
 
   real(wp), parameter :: pi = acos(-1.0_wp)
 

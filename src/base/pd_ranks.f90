@@ -25,8 +25,9 @@ module pd_ranks
     procedure, nopass :: largest_numbers
     procedure, nopass :: fill_in
     procedure, nopass :: swap
-    procedure, nopass :: collect
     procedure, nopass :: spread_out
+    procedure, nopass :: hand_over
+    procedure, nopass :: gathered_rows
   end type ranks_t
 
 contains
@@ -95,6 +96,14 @@ contains
     all_parts = parts
   end function gathered
 
+  !> The same of several numbers per block.
+  pure function gathered_rows(parts) result(all_parts)
+    real(wp), intent(in) :: parts(:, :)   !! (numbers, blocks of this rank)
+    real(wp), allocatable :: all_parts(:, :)
+
+    all_parts = parts
+  end function gathered_rows
+
   !> The largest of every number on any rank.
   pure subroutine largest_numbers(numbers)
     integer, intent(inout) :: numbers(:)
@@ -124,16 +133,16 @@ contains
     end associate
   end subroutine swap
 
-  !> Columns of an array of which each is known to one rank, made known to rank 0.
-  pure subroutine collect(values, ends)
+  !> What one rank has, made known to rank 0.
+  pure subroutine hand_over(from, values)
+    integer,  intent(in) :: from   !! the rank
     real(wp), intent(inout), contiguous :: values(:, :)
-    integer,  intent(in) :: ends(0:)   !! last column of each rank; ends(0): those before the first
 
-    associate (unused => ends, unchanged => values)
+    associate (unused => from, unchanged => values)
     end associate
-  end subroutine collect
+  end subroutine hand_over
 
-  !> The same, made known to all ranks.
+  !> Columns of an array of which each is known to one rank, made known to all.
   pure subroutine spread_out(values, ends)
     real(wp), intent(inout), contiguous :: values(:, :)
     integer,  intent(in) :: ends(0:)

@@ -25,10 +25,16 @@ contains
   pure type(shared_rows_t) function new_shared_rows(marked, blocks) result(shared)
     logical,        intent(in) :: marked(:)   !! (n)
     type(blocks_t), intent(in) :: blocks
-    integer :: i
+    integer :: i, n
 
     shared%ranks = blocks%ranks
-    shared%rows = pack([(i, i=1, size(marked))], marked)
+    allocate (shared%rows(count(marked)))
+    n = 0
+    do i = 1, size(marked)
+      if (.not. marked(i)) cycle
+      n = n + 1
+      shared%rows(n) = i
+    end do
     shared%mine = shared%rows >= blocks%first .and. shared%rows <= blocks%last
   end function new_shared_rows
 

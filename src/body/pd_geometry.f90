@@ -4,7 +4,7 @@
 !> Source: doc/theory.md, sections 1 and 7.
 module pd_geometry
   use pd_errors, only: error_list_t
-  use pd_kinds, only: wp
+  use pd_kinds, only: l1, wp
   use pd_layers, only: fill_edges, fill_layer, go_on_over_layers, layer_t
   use pd_places, only: empty, give_slivers, lattice_t, new_places, places_t, volume_at
   use pd_point_sets, only: side_t
@@ -30,7 +30,7 @@ module pd_geometry
                                                 !! of all stages (2,2); not allocated: no stages
     real(wp) :: lower(2) = 0.0_wp               !! corners of the extent of the body without
     real(wp) :: upper(2) = 0.0_wp               !! fictitious points, as used [m]
-    logical,  allocatable :: filled(:, :)       !! square above and right of the lattice line at a
+    logical(l1), allocatable :: filled(:, :)    !! square above and right of the lattice line at a
                                                 !! place is material, layers included (columns,
                                                 !! rows of places, with a margin); not for a cloud
     type(side_t) :: sides(side_count)           !! by number (`pd_sides`); not for a cloud

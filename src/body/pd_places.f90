@@ -5,7 +5,7 @@
 !> lines; place and square (0, 0) are the lower left ones of the body.
 !> Source: doc/theory.md, section 1.
 module pd_places
-  use pd_kinds, only: i8, wp
+  use pd_kinds, only: i1, i8, l1, wp
   use pd_region, only: area_within, box_of, mark_edges, on_edges, part_on, parts_on_grid, shape_t
   use pd_sides, only: bottom, left, right, side_count, top
   implicit none
@@ -27,20 +27,21 @@ module pd_places
     type(shape_t), allocatable :: shapes(:)     !! the region
     integer, allocatable :: owner(:, :)         !! `empty`, or as body_t%boundary
     integer, allocatable :: part(:, :)          !! number of the shape; 0: none
-    logical, allocatable :: filled(:, :)        !! the square above and right of a lattice line
+    logical(l1), allocatable :: filled(:, :)    !! the square above and right of a lattice line
                                                 !! holds material, layers included
-    logical, allocatable :: whole(:, :)         !! a layer makes all of it material
-    logical, allocatable :: whole_cell(:, :)    !! the point at a place owns a whole cell
+    logical(l1), allocatable :: whole(:, :)     !! a layer makes all of it material
+    logical(l1), allocatable :: whole_cell(:, :)!! the point at a place owns a whole cell
     integer, allocatable :: number(:, :)        !! of the point at a place, 0: none
     integer  :: line(side_count) = 0            !! outermost column or row of places at each side
     integer  :: squares(2, 2) = 0               !! first and last column, first and last row that
                                                 !! the box around the solids touches
     real(wp) :: box(2, 2) = 0.0_wp              !! lower and upper corner of that box [spacings]
-    integer, allocatable, private :: half(:, :) !! quarters of squares, halves of a spacing wide
+    integer(i1), allocatable, private :: half(:, :) !! quarters of squares, halves of a spacing wide
   end type places_t
 
   integer, parameter :: empty = -1
-  integer, parameter :: air = 0, material = 1, cut = 2   ! a quarter; cut: an edge goes through it
+  ! a quarter; cut: an edge goes through it
+  integer(i1), parameter :: air = 0_i1, material = 1_i1, cut = 2_i1
   real(wp), parameter :: round_off = 1.0e-6_wp
   real(wp), parameter :: hardly = 1.0e-6_wp   ! of a square: no material
 
@@ -65,7 +66,7 @@ contains
     high = places%squares(2, :) + lattice%rows + 2
     allocate (places%owner(low(1):high(1), low(2):high(2)), source=empty)
     allocate (places%part, mold=places%owner)
-    allocate (places%filled(low(1):high(1), low(2):high(2)), source=.false.)
+    allocate (places%filled(low(1):high(1), low(2):high(2)), source=.false._l1)
     allocate (places%whole, places%whole_cell, source=places%filled)
     call find_parts(places, real(low, wp) + offset)
     call find_halves(places)
@@ -76,10 +77,10 @@ contains
   subroutine find_parts(places, first)
     type(places_t), intent(inout) :: places
     real(wp),       intent(in)    :: first(2)   !! the first place [spacings]
-    logical, allocatable :: marked(:, :)
+    logical(l1), allocatable :: marked(:, :)
     integer :: i, j
 
-    allocate (marked(size(places%part, 1), size(places%part, 2)), source=.false.)
+    allocate (marked(size(places%part, 1), size(places%part, 2)), source=.false._l1)
     call parts_on_grid(places%shapes, first, 1.0_wp, places%part)
     call on_edges(places%shapes, first, marked)
     associate (low => lbound(places%part))
@@ -96,18 +97,23 @@ contains
   !> What lies in the quarters of the squares.
   subroutine find_halves(places)
     type(places_t), intent(inout) :: places
-    logical, allocatable :: marked(:, :)
+    logical(l1), allocatable :: marked(:, :)
+    integer,     allocatable :: line(:, :)
     real(wp), parameter  :: width = 0.5_wp
     real(wp) :: corner(2)
-    integer  :: low(2), high(2)
+    integer  :: j, low(2), high(2)
 
     low = 2 * places%squares(1, :)
     high = 2 * places%squares(2, :) + 1
     corner = real(places%squares(1, :), wp)
     allocate (places%half(low(1):high(1), low(2):high(2)))
-    allocate (marked(high(1) - low(1) + 1, high(2) - low(2) + 1), source=.false.)
-    call parts_on_grid(places%shapes, corner + 0.5_wp * width, width, places%half)
-    places%half = merge(material, air, places%half > 0)
+    allocate (marked(high(1) - low(1) + 1, high(2) - low(2) + 1), source=.false._l1)
+    allocate (line(size(marked, 1), 1))
+    do j = 1, size(marked, 2)   ! line by line: all at once would take four bytes for each
+      call parts_on_grid(places%shapes, [corner(1) + 0.5_wp * width, corner(2) + 0.5_wp * width &
+        + width * real(j - 1, wp)], width, line)
+      places%half(:, low(2) + j - 1) = merge(material, air, line(:, 1) > 0)
+    end do
     call mark_edges(places%shapes, corner, width, marked)
     where (marked) places%half = cut
   end subroutine find_halves

@@ -4,7 +4,7 @@
 !> Lengths are in spacings of the lattice, from its origin: what lies on lattice lines is exact.
 !> Source: doc/theory.md, section 1.
 module pd_region
-  use pd_kinds, only: wp
+  use pd_kinds, only: l1, wp
   use pd_polygons, only: distance_to_edge, inside, next_vertex
   implicit none
   private
@@ -173,7 +173,7 @@ contains
   pure subroutine mark_edges(shapes, first, width, marked)
     type(shape_t), intent(in)    :: shapes(:)
     real(wp),      intent(in)    :: first(2), width
-    logical,       intent(inout) :: marked(:, :)
+    logical(l1),   intent(inout) :: marked(:, :)
     real(wp), parameter :: margin = 1.0e-6_wp
     real(wp) :: ends(2)
     integer  :: i, j, k, from, to
@@ -189,7 +189,7 @@ contains
               call clip(a, b, ends)
               ends = (ends + [-margin, margin] - first(1)) / width
               marked(max(1, floor(ends(1)) + 1):min(size(marked, 1), floor(ends(2)) + 1), j) &
-                = .true.
+                = .true._l1
             end do
           end associate
         end do
@@ -215,7 +215,7 @@ contains
   pure subroutine on_edges(shapes, first, marked)
     type(shape_t), intent(in)    :: shapes(:)
     real(wp),      intent(in)    :: first(2)       !! of place (1, 1); the others a spacing apart
-    logical,       intent(inout) :: marked(:, :)
+    logical(l1),   intent(inout) :: marked(:, :)
     real(wp) :: distance, ends(2), foot
     integer  :: c, i, j, k
 
@@ -230,7 +230,7 @@ contains
               ends = ends + [-2.0_wp, 2.0_wp] * near - first(1)
               do c = max(1, ceiling(ends(1)) + 1), min(size(marked, 1), floor(ends(2)) + 1)
                 call distance_to_edge(a, b, first + real([c - 1, j - 1], wp), distance, foot)
-                if (distance <= near) marked(c, j) = .true.
+                if (distance <= near) marked(c, j) = .true._l1
               end do
             end do
           end associate

@@ -14,7 +14,7 @@
 !> Source: doc/theory.md, section 1.
 module pd_sight
   use pd_geometry, only: body_t
-  use pd_kinds, only: wp
+  use pd_kinds, only: l1, wp
   implicit none
   private
 
@@ -27,7 +27,7 @@ module pd_sight
     real(wp) :: delta = 0.0_wp                        !! horizon [m]
     integer,  allocatable, private :: place(:, :)     !! of every point (n,2); not for a cloud
     real(wp), allocatable, private :: position(:, :)  !! X (n,2) [m]
-    logical,  allocatable, private :: filled(:, :)    !! as in body_t
+    logical(l1), allocatable, private :: filled(:, :) !! as in body_t
     integer,  allocatable, private :: holes(:, :)     !! empty squares up to this column and row
     real(wp), allocatable :: cuts(:, :)               !! x, y, x, y of their ends (4,cuts) [m]
   contains

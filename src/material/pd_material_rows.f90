@@ -34,6 +34,8 @@ module pd_material_rows
     integer,          allocatable :: first_run(:)   !! of each block, one past the last (blocks+1)
     type(run_t),      allocatable :: parts(:)       !! of the runs, where they hold points
     integer,          allocatable :: first_part(:)  !! of each run, one past the last (runs+1)
+    logical,          allocatable :: used(:)        !! which materials any rank has; not
+                                                    !! allocated: those of the runs
     logical :: has_gaps = .false.                   !! parts are less than the runs
     !> Stiffness of the rows over that of their material (n); not allocated: 1 everywhere.
     real(wp),         allocatable :: stiffness(:)
@@ -147,6 +149,7 @@ contains
     integer,            intent(in) :: k
 
     is_used = any(self%runs%material == k)
+    if (allocated(self%used)) is_used = self%used(k)
   end function is_used
 
   !> Largest c_p = sqrt((lambda + 2 G) / rho) of any material that the body has [m/s].

@@ -6,6 +6,7 @@ module pd_model
   use pd_loads, only: loads_t
   use pd_materials, only: materials_t
   use pd_operators, only: operators_t
+  use pd_pages, only: clear_rows
   use pd_platens, only: platens_t, reference_ends
   use pd_points, only: points_t, probe_t
   use pd_shared_rows, only: shared_rows_t
@@ -16,6 +17,7 @@ module pd_model
   private
 
   public :: model_t, damping_frame_t, initial_t, start, damping_frame, release_set_up
+  public :: release_points
   public :: top_of
 
   !> Strain, stress and internal forces of a body with an initial stress, before any motion.
@@ -68,10 +70,18 @@ contains
   subroutine release_set_up(model)
     type(model_t), intent(inout) :: model
 
-    deallocate (model%body%position, model%body%volume, model%body%part)
-    if (allocated(model%body%place)) deallocate (model%body%place)
+    if (allocated(model%body%position)) call release_points(model%body)
     if (allocated(model%initial)) deallocate (model%initial)
   end subroutine release_set_up
+
+  !> Give back the memory of the points of a body, but for the boundaries that they belong to.
+  subroutine release_points(body)
+    type(body_t), intent(inout) :: body
+
+    deallocate (body%position, body%volume, body%part)
+    if (allocated(body%place)) deallocate (body%place)
+    if (allocated(body%filled)) deallocate (body%filled)
+  end subroutine release_points
 
   !> Height of the top of the body before any stage has dug into it [m].
   pure real(wp) function top_of(model) result(top)
@@ -102,6 +112,8 @@ contains
     state%in_stages = model%whole%n > 0
     state%has_initial_strain = allocated(model%initial) .or. state%in_stages
     call state%allocate(size(model%points%volume), model%materials%remembered(), kept)
+    ! it stays zero: no memory for it
+    if (.not. allocated(model%operators%relaxing)) call clear_rows(state%control_memory, [1, 0])
     frame = damping_frame(model, 0.0_wp)
     associate (a => kept(1), b => kept(2))
       if (allocated(model%initial)) then

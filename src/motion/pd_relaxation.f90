@@ -141,7 +141,7 @@ contains
     type(relaxed_t),    intent(out)   :: relaxed
     type(pace_t) :: pace
     real(wp) :: sums(n_sums), loads
-    integer  :: k, s
+    integer  :: k
 
     loads = loads_at(model, t)
     relaxation%kept = 0.0_wp
@@ -161,9 +161,7 @@ contains
       call model%supports%share_forces(model%points%volume, t, state%force)
       call timing%lap(kernel_boundaries)
       call add_up(model, state, relaxation)
-      do s = 1, n_sums
-        sums(s) = model%blocks%total(relaxation%sums(s, :))
-      end do
+      sums = model%blocks%totals(relaxation%sums)
       relaxed%work = relaxed%work + relaxation%sums(work_done, :)
       relaxed%residual = over(sums(free_force), sums(held_force) + loads)
       relaxed%at_rest = relaxed%residual <= relaxation%residual

@@ -6,7 +6,7 @@ module pd_stability
   use pd_forces, only: linear_forces, next_step_t, prepare_next_step
   use pd_kinds, only: block_sum, n_block, wp
   use pd_model, only: model_t
-  use pd_pages, only: forget_rows
+  use pd_pages, only: clear_rows
   use pd_state, only: state_t
   implicit none
   private
@@ -86,17 +86,11 @@ contains
     call model%operators%domain%make_room(n, 2, q)
     call model%operators%domain%make_room(n, 2, r)
     call model%operators%domain%make_room(n, 2, q_old)
-    allocate (density(n), source=model%materials%density_of(n))
-    ! with weights of this size q has the size of a spacing, and its gradient that of 1
-    allocate (volume(n), source=model%points%volume &
-      / (sum(model%points%volume) * maxval(model%points%volume)))
-    allocate (mass(n), source=volume * (density / model%materials%list(1)%density))
-    call forget_rows(density, kept)
-    call forget_rows(volume, kept)
-    call forget_rows(mass, kept)
+    call weigh_rows(model, kept, density, volume, mass)
     associate (free => model%points%free, blocks => model%blocks, &
       reference => model%materials%list(1)%density)
-      call scatter(model%points%volume, free, kept, q)
+      call scatter(model%points%volume, free, &
+        model%operators%storage%first_point(kept(1)) - 1, kept, q)
       off_diagonal(0) = 0.0_wp
       ritz = 0.0_wp
       call scale_to(1.0_wp / sqrt(product_of(blocks, mass, q, q, free)), blocks, q)
@@ -121,20 +115,46 @@ contains
     if (iterations <= look_back) frequency = sqrt(max(0.0_wp, ritz(iterations)))
   end subroutine highest_frequency
 
+  !> Density of the rows, and the weights of the inner products, with V rho and with V alone: of
+  !> such a size that q has the size of a spacing, and its gradient that of 1.
+  subroutine weigh_rows(model, kept, density, volume, mass)
+    type(model_t), intent(in) :: model
+    integer,       intent(in) :: kept(2)   !! first and last row that is needed
+    real(wp), allocatable, intent(out) :: density(:), volume(:), mass(:)   !! (n)
+    integer :: k, n
+
+    n = size(model%points%volume)
+    allocate (density(n), volume(n), mass(n))
+    call clear_rows(density, kept)
+    call clear_rows(volume, kept)
+    call clear_rows(mass, kept)
+    associate (a => kept(1), b => kept(2), materials => model%materials, points => model%points)
+      density(a:b) = materials%list(1)%density
+      do k = 1, size(materials%runs)
+        associate (run => materials%runs(k))
+          if (run%hi < a .or. run%lo > b) cycle
+          density(max(a, run%lo):min(b, run%hi)) = materials%list(run%material)%density
+        end associate
+      end do
+      volume(a:b) = points%volume(a:b) / (points%all_volume * points%largest_volume)
+      mass(a:b) = volume(a:b) * (density(a:b) / materials%list(1)%density)
+    end associate
+  end subroutine weigh_rows
+
   !> A vector with every frequency in it: the same pseudo-random numbers in every run,
   !> whether or not there are rows without a point (volume 0).
-  subroutine scatter(volume, free, kept, q)
+  subroutine scatter(volume, free, before, kept, q)
     real(wp), intent(in)    :: volume(:), free(:, :)
+    integer,  intent(in)    :: before    !! points before the first of these rows
     integer,  intent(in)    :: kept(2)   !! first and last row that is needed
     real(wp), intent(inout) :: q(:, :)
     real(wp), parameter :: golden = 0.6180339887498949_wp, silver = 0.4142135623730951_wp
     real(wp) :: x(2)
     integer  :: i, number
 
-    number = 0
-    do i = 1, kept(2)
+    number = before
+    do i = kept(1), kept(2)
       if (volume(i) > 0.0_wp) number = number + 1
-      if (i < kept(1)) cycle
       x = real(number, wp)**2 * [golden, silver]
       q(i, :) = free(i, :) * (x - aint(x) - 0.5_wp)
     end do

@@ -3,11 +3,11 @@
 !> `visit` is the table of its fields: everything that is done with all of them is a visitor.
 module pd_state
   use pd_blocks, only: blocks_t
-  use pd_fields, only: allocating_t, counting_t, field_visitor_t, scattering_t, state_field_t
+  use pd_fields, only: counting_t, field_visitor_t, scattering_t, state_field_t
   use pd_kinds, only: wp
   use pd_labels, only: label_t
   use pd_law, only: law_points_t
-  use pd_pages, only: forget_rows
+  use pd_pages, only: clear_rows, forget_rows
   implicit none
   private
 
@@ -47,7 +47,8 @@ module pd_state
   end type block_work_t
 
   !> Make room for unloaded points, with memory for some rows only.
-  type, extends(allocating_t) :: room_t
+  type, extends(field_visitor_t) :: room_t
+    integer :: n = 0
     integer :: kept(2) = 0              !! first and last of these rows
   contains
     procedure :: one_number => room_1
@@ -126,17 +127,24 @@ contains
     type(state_field_t),   intent(in)    :: about
     real(wp), allocatable, intent(inout) :: values(:)
 
-    call self%allocating_t%one_number(about, values)
-    call forget_rows(values, self%kept)
+    if (allocated(values)) deallocate (values)
+    allocate (values(self%n))
+    call clear_rows(values, self%kept)
+    if (abs(about%unloaded(1)) > 0.0_wp) values(self%kept(1):self%kept(2)) = about%unloaded(1)
   end subroutine room_1
 
   subroutine room_2(self, about, values)
     class(room_t),         intent(inout) :: self
     type(state_field_t),   intent(in)    :: about
     real(wp), allocatable, intent(inout) :: values(:, :)
+    integer :: k
 
-    call self%allocating_t%several_numbers(about, values)
-    call forget_rows(values, self%kept)
+    if (allocated(values)) deallocate (values)
+    allocate (values(self%n, about%width()))
+    call clear_rows(values, self%kept)
+    do k = 1, about%width()
+      if (abs(about%unloaded(k)) > 0.0_wp) values(self%kept(1):self%kept(2), k) = about%unloaded(k)
+    end do
   end subroutine room_2
 
   !> Keep nothing but these rows; the others are zero, or what they were.

@@ -82,7 +82,7 @@ contains
     real(wp) :: applied(2)
     integer  :: k, c
 
-    allocate (load(size(model%points%volume), 2), source=0.0_wp)
+    call model%operators%domain%make_room(model%operators%n, 2, load)
     call model%loads%add_forces(model%points%volume, t, load)
     do k = 1, size(model%supports%items)
       associate (support => model%supports%items(k)%support)

@@ -8,6 +8,7 @@ module pd_zero_energy
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   use pd_kinds, only: n_block, wp
   use pd_model, only: model_t
+  use pd_pages, only: clear_rows
   use pd_state, only: state_t
   implicit none
   private
@@ -25,7 +26,7 @@ contains
     real(wp), parameter :: tiny_strain = 1.0e-9_wp, enough = 0.01_wp
     real(wp), allocatable :: z2(:), flowed(:), parts(:, :)
     real(wp) :: sums(4)
-    integer  :: block, k
+    integer  :: block
 
     allocate (z2(model%operators%n), parts(4, model%blocks%count))
     call look_for_flow(model, state, flowed)
@@ -33,9 +34,7 @@ contains
     do block = 1, model%blocks%count
       parts(:, block) = sums_of_block(block, model, state, z2, flowed)
     end do
-    do k = 1, size(sums)
-      sums(k) = model%blocks%total(parts(k, :))
-    end do
+    sums = model%blocks%totals(parts)
     ratio = ieee_value(1.0_wp, ieee_quiet_nan)
     if (sums(2) > tiny_strain**2 * sums(3) .and. sums(3) > enough * sums(4)) &
       ratio = sqrt(sums(1) / sums(2)) / model%delta
@@ -53,8 +52,10 @@ contains
     real(wp) :: alpha(n_block)
     integer  :: block
 
-    allocate (flowed(model%operators%n), source=0.0_wp)
-    allocate (mark(model%operators%n, 2), h(model%operators%n, 4), source=0.0_wp)
+    allocate (flowed(model%operators%n))
+    call clear_rows(flowed, model%operators%storage%kept)
+    call model%operators%domain%make_room(model%operators%n, 2, mark)
+    call model%operators%domain%make_room(model%operators%n, 4, h)
     do block = 1, model%blocks%count
       associate (lo => model%blocks%lo(block), hi => model%blocks%hi(block))
         call model%materials%plastic_strain_block(block, state%law_points_t, alpha)
@@ -63,8 +64,11 @@ contains
     end do
     call model%operators%domain%halo%exchange(mark)
     call model%operators%zero_energy_squared(mark, h, flowed)
-    where (model%operators%weight_sum > 0.0_wp) flowed = flowed / model%operators%weight_sum
-    flowed = flowed + mark(:, 1)
+    associate (a => model%blocks%first, b => model%blocks%last, &
+      weight => model%operators%weight_sum)
+      where (weight(a:b) > 0.0_wp) flowed(a:b) = flowed(a:b) / weight(a:b)
+      flowed(a:b) = flowed(a:b) + mark(a:b, 1)
+    end associate
   end subroutine look_for_flow
 
   !> sum V delta^2 z^2, sum V |E|^2 and sum V of the points far from flow, and sum V of all, of a

@@ -62,7 +62,7 @@ contains
     operators%n = n
     operators%storage = listed_storage(n)
     operators%domain = new_domain(1, n)
-    operators%stretches = new_stretches(operators%domain%blocks, spread(.true., 1, n))
+    operators%stretches = new_stretches(operators%domain%blocks, spread(1.0_wp, 1, n))
     allocate (operators%position(n, 2), source=position)
     call sort_into_cells(position, horizon%delta, cells)
     most = largest_neighbourhood(cells)

@@ -3,7 +3,7 @@ module pd_domain
   use pd_blocks, only: blocks_t, new_blocks
   use pd_halo, only: halo_t
   use pd_kinds, only: wp
-  use pd_pages, only: forget_rows
+  use pd_pages, only: clear_rows
   use pd_ranks, only: ranks_t
   implicit none
   private
@@ -84,8 +84,8 @@ contains
     real(wp), allocatable, intent(inout) :: field(:, :)   !! (n,components)
 
     if (allocated(field)) return
-    allocate (field(n, components), source=0.0_wp)
-    call forget_rows(field, self%kept(n))
+    allocate (field(n, components))
+    call clear_rows(field, self%kept(n))
   end subroutine make_room
 
   !> Those of some rows that are between two.

@@ -20,11 +20,15 @@ module pd_lattice
   use pd_columns, only: add_sums, columns_t
   use pd_domain, only: new_domain
   use pd_families, only: horizon_t, influence
+  use pd_family_weights, only: add_zero_energy, bond_count_t, count_bonds, weigh_families
   use pd_kinds, only: i8, n_block, wp
   use pd_offsets, only: columns_of, half_of_offsets, residual_weights
+  use pd_operator_parts, only: divide_domain, points_in_blocks
   use pd_operator_rows, only: own_part_of_force
   use pd_operators, only: operators_t
+  use pd_pages, only: clear_rows
   use pd_radial_sums, only: add_radial_sums, new_radial_sums, radial_sums_t
+  use pd_ranks, only: ranks_t
   use pd_sight, only: sight_t
   use pd_storage, only: lattice_storage, line_start
   use pd_stretches, only: new_stretches
@@ -65,8 +69,8 @@ module pd_lattice
 
 contains
 
-  !> Offsets, weights and moments.
-  subroutine new_lattice_operators(horizon, spacing, place, volume, operators, sight, box)
+  !> Offsets, weights and moments. `ranks`: unless bonds are blocked, each has its own blocks only.
+  subroutine new_lattice_operators(horizon, spacing, place, volume, operators, sight, box, ranks)
     type(horizon_t), intent(in) :: horizon
     real(wp),        intent(in) :: spacing       !! dx [m]
     integer,         intent(in) :: place(:, :)   !! column and row of every point (n,2)
@@ -74,6 +78,7 @@ contains
     type(lattice_operators_t), intent(out) :: operators
     type(sight_t), optional, intent(in) :: sight   !! absent: bonds cross air
     integer, optional, intent(in) :: box(:, :)   !! of `lattice_storage`
+    type(ranks_t), optional, intent(in) :: ranks
     integer :: reach, i
 
     operators%storage = lattice_storage(horizon, spacing, place, box)
@@ -85,20 +90,22 @@ contains
     operators%columns = columns_of(horizon, spacing, operators%storage%stride, reach)
     operators%own_weight = influence(horizon, 0.0_wp) * spacing**2
 
-    allocate (operators%share_of(operators%n))
-    operators%share_of = operators%storage%spread(volume) / spacing**2
-    operators%weighs = any(abs(operators%share_of) > 0.0_wp .and. &
-      abs(operators%share_of - 1.0_wp) > 1.0e-12_wp)
-    if (.not. operators%weighs) operators%share_of = anint(operators%share_of)
     operators%domain = new_domain(line_start(operators%storage%ends(1)), operators%storage%ends(2))
-    operators%stretches = new_stretches(operators%domain%blocks, operators%share_of > 0.0_wp)
     if (present(sight)) call new_blocked_bonds(sight, operators%storage, operators%shift, &
       operators%xi, operators%weight, operators%blocked)
-    if (allocated(operators%blocked)) operators%hidden_bonds = operators%blocked%count
+    if (allocated(operators%blocked)) then
+      operators%hidden_bonds = operators%blocked%count
+    else if (present(ranks)) then
+      call divide_domain(operators, ranks, &
+        points_in_blocks(operators%storage, operators%domain%blocks))
+    end if
+    call operators%storage%take_shares(volume / spacing**2, operators%weighs, operators%share_of)
+    operators%stretches = new_stretches(operators%domain%blocks, operators%share_of)
     call weigh(operators)
     if (operators%weighs) then
-      allocate (operators%weighed_moment(operators%n, 2), source=0.0_wp)
-      do i = 1, operators%n
+      allocate (operators%weighed_moment(operators%n, 2))
+      call clear_rows(operators%weighed_moment, operators%storage%kept)
+      do i = operators%storage%kept(1), operators%storage%kept(2)
         if (operators%share_of(i) > 0.0_wp) &
           operators%weighed_moment(i, :) = operators%moment(i, :) / operators%share_of(i)
       end do
@@ -108,67 +115,55 @@ contains
   !> W_i and s_i from the shares of the neighbours, and the numbers of bonds.
   subroutine weigh(operators)
     type(lattice_operators_t), intent(inout) :: operators
-    integer, allocatable :: fewest(:), poorest(:)
-    integer(i8), allocatable :: n_bonds(:)
+    type(bond_count_t), allocatable :: found(:)
+    type(bond_count_t) :: unheard
     type(blocks_t) :: blocks
-    integer :: block
+    integer :: block, lo, kept(2)
 
     blocks = operators%domain%blocks
-    allocate (operators%weight_sum(operators%n), source=1.0_wp)
-    allocate (operators%moment(operators%n, 2), source=0.0_wp)
-    allocate (fewest(blocks%count), poorest(blocks%count), n_bonds(blocks%count))
-    !$omp parallel do schedule(static) default(none) private(block) &
-    !$omp shared(operators, blocks, fewest, poorest, n_bonds)
+    kept = operators%domain%kept(operators%n)
+    allocate (operators%weight_sum(operators%n), operators%moment(operators%n, 2))
+    call clear_rows(operators%weight_sum, kept)
+    call clear_rows(operators%moment, kept)
+    operators%weight_sum(kept(1):kept(2)) = 1.0_wp
+    allocate (found(blocks%count))
+    !$omp parallel do schedule(static) default(none) private(block) shared(operators, blocks, found)
     do block = 1, blocks%count
-      call count_block(operators, blocks%lo(block), blocks%hi(block), fewest(block), &
-        poorest(block), n_bonds(block))
+      call weigh_rows(operators, blocks%lo(block), blocks%hi(block), found(block))
     end do
     !$omp end parallel do
-    operators%n_bonds = sum(n_bonds)
-    operators%fewest = minval(fewest)
-    operators%poorest = poorest(minloc(fewest, dim=1))
+    associate (known => operators%domain%known)
+      do lo = known(1), blocks%first - 1, n_block   ! the halo
+        call weigh_rows(operators, lo, min(lo + n_block, blocks%first) - 1, unheard)
+      end do
+      do lo = blocks%last + 1, known(2), n_block
+        call weigh_rows(operators, lo, min(lo + n_block - 1, known(2)), unheard)
+      end do
+    end associate
+    operators%n_bonds = nint(blocks%total(real(found%bonds, wp)), i8)
+    operators%fewest = nint(blocks%smallest(real(found%fewest, wp)))
+    operators%poorest = blocks%lowest_number(merge(found%poorest, 0, &
+      found%fewest == operators%fewest))
   end subroutine weigh
 
   !> The same for rows lo to hi.
-  subroutine count_block(operators, lo, hi, fewest, poorest, n_bonds)
+  subroutine weigh_rows(operators, lo, hi, found)
     type(lattice_operators_t), intent(inout) :: operators
-    integer,     intent(in)  :: lo, hi
-    integer,     intent(out) :: fewest, poorest   !! bonds of any point, and the first such
-    integer(i8), intent(out) :: n_bonds           !! of all
-    real(wp) :: plus, minus, total(n_block), moment(n_block, 2)
-    integer  :: i, k, s, found(n_block)
+    integer,            intent(in)  :: lo, hi
+    type(bond_count_t), intent(out) :: found
+    real(wp) :: total(n_block), moment(n_block, 2)
+    integer  :: bonds(n_block), i
 
-    total = 0.0_wp
-    moment = 0.0_wp
-    found = 0
-    associate (share => operators%share_of)
-      do k = 1, operators%n_pairs
-        s = operators%shift(k)
-        do i = 1, hi - lo + 1
-          plus = operators%weight(k) * share(lo - 1 + i + s)
-          minus = operators%weight(k) * share(lo - 1 + i - s)
-          total(i) = total(i) + plus + minus
-          moment(i, 1) = moment(i, 1) + (plus - minus) * operators%xi(k, 1)
-          moment(i, 2) = moment(i, 2) + (plus - minus) * operators%xi(k, 2)
-          found(i) = found(i) + merge(1, 0, plus > 0.0_wp) + merge(1, 0, minus > 0.0_wp)
-        end do
-      end do
-      if (allocated(operators%blocked)) &
-        call operators%blocked%recount(lo, hi, share, total, moment, found)
-      operators%moment(lo:hi, :) = moment(:hi - lo + 1, :)
-      fewest = huge(1)
-      poorest = 0
-      n_bonds = 0
-      do i = 1, hi - lo + 1
-        if (share(lo - 1 + i) <= 0.0_wp) cycle
-        operators%weight_sum(lo - 1 + i) = total(i)
-        n_bonds = n_bonds + int(found(i), i8)
-        if (found(i) >= fewest) cycle
-        fewest = found(i)
-        poorest = lo - 1 + i
-      end do
-    end associate
-  end subroutine count_block
+    call weigh_families(operators%shift, operators%xi, operators%weight, operators%share_of, &
+      [lo, hi], total, moment, bonds)
+    if (allocated(operators%blocked)) &
+      call operators%blocked%recount(lo, hi, operators%share_of, total, moment, bonds)
+    operators%moment(lo:hi, :) = moment(:hi - lo + 1, :)
+    do i = lo, hi
+      if (operators%share_of(i) > 0.0_wp) operators%weight_sum(i) = total(i - lo + 1)
+    end do
+    found = count_bonds(lo, bonds(:hi - lo + 1), operators%share_of(lo:hi))
+  end subroutine weigh_rows
 
   !> G[u] of rows lo to hi: g = sum_j omega V_j (u_j - u_i) (x) xi.
   pure subroutine gradient_sums_block(self, lo, hi, u, g)
@@ -233,12 +228,18 @@ contains
     class(lattice_operators_t), intent(inout) :: self
     real(wp), intent(in), contiguous :: c(:)   !! (n) [N/m^6]; voids: 0
     real(wp), allocatable :: shared(:)
-    integer :: block, lo, hi
+    integer :: block, lo, hi, kept(2)
 
-    self%control = c
-    shared = self%share_of * c
-    if (.not. allocated(self%pull)) allocate (self%pull(self%n, 2), source=0.0_wp)
-    if (.not. allocated(self%stiffness)) allocate (self%stiffness(self%n), source=0.0_wp)
+    kept = self%storage%kept
+    allocate (shared(self%n))
+    call clear_rows(shared, kept)
+    if (.not. allocated(self%control)) allocate (self%control, mold=shared)
+    if (.not. allocated(self%stiffness)) allocate (self%stiffness, mold=shared)
+    call clear_rows(self%control, kept)
+    call clear_rows(self%stiffness, kept)
+    self%control(kept(1):kept(2)) = c(kept(1):kept(2))
+    shared(kept(1):kept(2)) = self%share_of(kept(1):kept(2)) * c(kept(1):kept(2))
+    call self%domain%make_room(self%n, 2, self%pull)
     !$omp parallel do schedule(static) default(none) shared(self, c, shared) private(block, lo, hi)
     do block = 1, self%domain%blocks%count
       lo = self%domain%blocks%lo(block)
@@ -326,8 +327,10 @@ contains
     self%residual = new_radial_sums(residual_weights(self%xi, self%weight, falloff), &
       self%storage%stride)
     if (allocated(self%blocked)) call self%blocked%weigh_residuals(falloff)
-    allocate (nothing(self%n), source=0.0_wp)
-    self%residual_weight = nothing
+    allocate (nothing(self%n))
+    call clear_rows(nothing, self%storage%kept)
+    if (.not. allocated(self%residual_weight)) allocate (self%residual_weight, mold=nothing)
+    call clear_rows(self%residual_weight, self%storage%kept)
     !$omp parallel do schedule(static) default(none) shared(self, nothing) private(block, lo, hi)
     do block = 1, self%domain%blocks%count
       lo = self%domain%blocks%lo(block)
@@ -338,8 +341,13 @@ contains
         call self%blocked%take_out_of_residual(lo, hi, self%share_of, self%residual_weight(lo:hi))
     end do
     !$omp end parallel do
-    where (self%share_of <= 0.0_wp) self%residual_weight = 0.0_wp
-    where (self%share_of > 0.0_wp) self%residual_weight = self%residual_weight / self%share_of
+    associate (a => self%domain%blocks%first, b => self%domain%blocks%last)
+      where (self%share_of(a:b) > 0.0_wp)
+        self%residual_weight(a:b) = self%residual_weight(a:b) / self%share_of(a:b)
+      else where
+        self%residual_weight(a:b) = 0.0_wp
+      end where
+    end associate
   end subroutine weigh_residuals
 
   !> K = sum_j omega V_j xi (x) xi.
@@ -349,7 +357,7 @@ contains
     integer  :: block, lo, hi, i, p
     real(wp) :: both
 
-    k = 0.0_wp
+    k(self%domain%blocks%first:self%domain%blocks%last, :) = 0.0_wp
     !$omp parallel do schedule(static) default(none) shared(self, k) &
     !$omp private(block, lo, hi, i, p, both)
     do block = 1, self%domain%blocks%count
@@ -381,7 +389,7 @@ contains
     integer :: block
 
     blocks = self%domain%blocks
-    z2 = 0.0_wp
+    z2(blocks%first:blocks%last) = 0.0_wp
     !$omp parallel do schedule(static) default(none) private(block) shared(self, blocks, u, h, z2)
     do block = 1, blocks%count
       call zero_energy_block(self, blocks%lo(block), blocks%hi(block), u, h, z2)
@@ -396,26 +404,8 @@ contains
     real(wp), intent(in),    contiguous :: u(:, :)   !! (n,2) [m]
     real(wp), intent(in),    contiguous :: h(:, :)   !! H (n,4) xx xy yx yy
     real(wp), intent(inout), contiguous :: z2(:)     !! out: (n) [m^4]; voids: 0
-    real(wp) :: x, y, weight, ax, ay, plus, minus
-    integer  :: i, k, s
 
-    do k = 1, self%n_pairs
-      s = self%shift(k)
-      x = self%xi(k, 1)
-      y = self%xi(k, 2)
-      weight = self%weight(k)
-      !$omp simd simdlen(8) private(ax, ay, plus, minus)
-      do i = lo, hi
-        ax = h(i, 1) * x + h(i, 2) * y
-        ay = h(i, 3) * x + h(i, 4) * y
-        plus = (u(i + s, 1) - u(i, 1) - ax)**2 + (u(i + s, 2) - u(i, 2) - ay)**2
-        minus = (u(i - s, 1) - u(i, 1) + ax)**2 + (u(i - s, 2) - u(i, 2) + ay)**2
-        z2(i) = z2(i) + weight * (self%share_of(i + s) * plus + self%share_of(i - s) * minus)
-      end do
-    end do
-    do i = lo, hi
-      if (self%share_of(i) <= 0.0_wp) z2(i) = 0.0_wp
-    end do
+    call add_zero_energy(self%shift, self%xi, self%weight, self%share_of, [lo, hi], u, h, z2)
     if (allocated(self%blocked)) &
       call self%blocked%recount_zero_energy(lo, hi, self%share_of, u, h, z2)
   end subroutine zero_energy_block

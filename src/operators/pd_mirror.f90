@@ -35,6 +35,7 @@ module pd_mirror
     procedure :: moves_with
     procedure :: rows
     procedure :: divide
+    procedure :: known_rows
     procedure :: move
     procedure :: reflect_motion
     procedure :: hand_back
@@ -107,6 +108,14 @@ contains
     marked(self%row) = .true.
     self%both = new_shared_rows(marked, blocks)
   end subroutine divide
+
+  !> Rows that are made known to all ranks: before the exchange of a field, and for the forces.
+  pure function known_rows(self) result(sets)
+    class(mirror_t), intent(in) :: self
+    type(shared_rows_t) :: sets(2)
+
+    sets = [self%origins, self%both]
+  end function known_rows
 
   !> The planes go to where they are at time t.
   pure subroutine move(self, t)

@@ -3,14 +3,24 @@
 !> Source: doc/theory.md, sections 2, 4 and 5.
 module pd_operator_rows
   use pd_blocks, only: blocks_t
-  use pd_kinds, only: block_sum, n_block, wp
+  use pd_kinds, only: block_sum, n_block, pi, wp
   implicit none
   private
 
   public :: times_k_inverse, stress_times_k_inverse, subtract_affine_control, mean_displacement
-  public :: own_part_of_force, weigh_rows
+  public :: own_part_of_force, weigh_rows, control_stiffness
 
 contains
+
+  !> Stiffness of the control after Silling, c_i = g C_0 / W_i with C_0 = 48 E / (5 pi delta^2).
+  elemental real(wp) function control_stiffness(factor, youngs_modulus, delta, weight_sum) result(c)
+    real(wp), intent(in) :: factor            !! g
+    real(wp), intent(in) :: youngs_modulus    !! E [Pa]
+    real(wp), intent(in) :: delta             !! horizon [m]
+    real(wp), intent(in) :: weight_sum        !! W [m^2]
+
+    c = factor * 48.0_wp * youngs_modulus / (5.0_wp * pi * delta**2) / weight_sum
+  end function control_stiffness
 
   !> H = G K^-1 of rows lo to hi, in the place of G.
   pure subroutine times_k_inverse(lo, hi, k, h)

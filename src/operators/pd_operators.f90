@@ -23,10 +23,10 @@ module pd_operators
   use pd_blocks, only: blocks_t
   use pd_domain, only: domain_t
   use pd_flow, only: flow_t
-  use pd_kinds, only: block_sum, i8, n_block, pi, wp
+  use pd_kinds, only: block_sum, i8, n_block, wp
   use pd_mirror, only: mirror_t
-  use pd_operator_rows, only: mean_displacement, stress_times_k_inverse, subtract_affine_control, &
-    times_k_inverse, weigh_rows
+  use pd_operator_rows, only: control_stiffness, mean_displacement, stress_times_k_inverse, &
+    subtract_affine_control, times_k_inverse, weigh_rows
   use pd_relaxing, only: relaxing_t, springs_t
   use pd_storage, only: storage_t
   use pd_stretches, only: stretches_t
@@ -309,16 +309,6 @@ contains
     end do
   end subroutine force_block
 
-  !> Stiffness of the control after Silling, c_i = g C_0 / W_i with C_0 = 48 E / (5 pi delta^2).
-  elemental real(wp) function control_stiffness(factor, youngs_modulus, delta, weight_sum) result(c)
-    real(wp), intent(in) :: factor            !! g
-    real(wp), intent(in) :: youngs_modulus    !! E [Pa]
-    real(wp), intent(in) :: delta             !! horizon [m]
-    real(wp), intent(in) :: weight_sum        !! W [m^2]
-
-    c = factor * 48.0_wp * youngs_modulus / (5.0_wp * pi * delta**2) / weight_sum
-  end function control_stiffness
-
   !> Stiffness of the zero-energy control, from now on.
   subroutine set_control(self, c)
     class(operators_t), intent(inout) :: self
@@ -327,19 +317,22 @@ contains
     self%control = c
   end subroutine set_control
 
-  !> The relaxing control, from now on; its moments s~ are S[X].
+  !> The relaxing control, from now on, which goes over; its moments s~ are S[X].
   subroutine set_relaxing(self, relaxing, position)
     class(operators_t), intent(inout) :: self
-    type(relaxing_t),   intent(in)    :: relaxing
+    type(relaxing_t), allocatable, intent(inout) :: relaxing
     real(wp), intent(in), contiguous  :: position(:, :)   !! X (n,2) [m]
     real(wp), allocatable :: x(:, :)
     real(wp) :: sums(n_block, 2)
     integer  :: block, lo, hi
 
-    self%relaxing = relaxing
-    call self%weigh_residuals(relaxing%falloff)
-    allocate (x, source=position)
-    call self%weigh_block(1, self%n, x)
+    call move_alloc(relaxing, self%relaxing)
+    call self%weigh_residuals(self%relaxing%falloff)
+    call self%domain%make_room(self%n, 2, x)
+    lo = self%storage%kept(1)
+    hi = self%storage%kept(2)
+    x(lo:hi, :) = position(lo:hi, :)
+    call self%weigh_block(lo, hi, x)
     !$omp parallel do schedule(static) default(none) shared(self, x) private(block, lo, hi, sums)
     do block = 1, self%domain%blocks%count
       lo = self%domain%blocks%lo(block)
@@ -392,7 +385,7 @@ contains
 
     energy = 0.0_wp
     if (.not. allocated(self%control)) return
-    allocate (z(self%n, 2), source=0.0_wp)
+    call self%domain%make_room(self%n, 2, z)
     blocks = self%domain%blocks
     allocate (parts(blocks%count))
     mean = mean_displacement(blocks, volume, u)

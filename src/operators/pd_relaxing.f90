@@ -18,6 +18,7 @@ module pd_relaxing
   use pd_families, only: horizon_t, influence, within_horizon
   use pd_flow, only: flow_t
   use pd_kinds, only: block_sum, n_block, wp
+  use pd_pages, only: clear_rows
   implicit none
   private
 
@@ -91,27 +92,37 @@ contains
   end function whole_family
 
   !> The control of rows with these volumes; the moments s~ are still to come.
-  pure function new_relaxing(family, volume, youngs_modulus, delta, kappa, beta, turns) &
-    result(relaxing)
+  subroutine new_relaxing(family, volume, youngs_modulus, kept, delta, given, turns, relaxing)
     type(whole_family_t), intent(in) :: family
     real(wp), intent(in) :: volume(:)           !! V (n) [m^2]; 0: a row without a point
     real(wp), intent(in) :: youngs_modulus(:)   !! E (n) [Pa]
+    integer,  intent(in) :: kept(2)             !! first and last of the rows that are needed
     real(wp), intent(in) :: delta               !! horizon [m]
-    real(wp), intent(in) :: kappa, beta         !! stiffness [1], strain at which it relaxes [1]
+    real(wp), intent(in) :: given(2)            !! kappa: stiffness [1]; beta: strain at which it
+                                                !! relaxes [1]
     logical,  intent(in) :: turns               !! h is seen in the frame of the point
-    type(relaxing_t) :: relaxing
+    type(relaxing_t), allocatable, intent(out) :: relaxing
     integer :: n
 
     n = size(volume)
+    allocate (relaxing)
     relaxing%falloff = family%falloff
     relaxing%turns = merge(1.0_wp, 0.0_wp, turns)
-    allocate (relaxing%volume(n), source=volume)
-    allocate (relaxing%stiffness(n), source=kappa * youngs_modulus / delta**2)
-    allocate (relaxing%clock(n), source=kappa * youngs_modulus / beta)
     relaxing%inverse_weight = 1.0_wp / family%weight
-    where (volume <= 0.0_wp) relaxing%stiffness = 0.0_wp
-    allocate (relaxing%moment(n, 2), relaxing%pull(n, 2), source=0.0_wp)
-  end function new_relaxing
+    allocate (relaxing%volume(n), relaxing%stiffness(n), relaxing%clock(n))
+    allocate (relaxing%moment(n, 2), relaxing%pull(n, 2))
+    call clear_rows(relaxing%volume, kept)
+    call clear_rows(relaxing%stiffness, kept)
+    call clear_rows(relaxing%clock, kept)
+    call clear_rows(relaxing%moment, kept)
+    call clear_rows(relaxing%pull, kept)
+    associate (a => kept(1), b => kept(2), kappa => given(1), beta => given(2))
+      relaxing%volume(a:b) = volume(a:b)
+      relaxing%stiffness(a:b) = kappa * youngs_modulus(a:b) / delta**2
+      relaxing%clock(a:b) = kappa * youngs_modulus(a:b) / beta
+      where (volume(a:b) <= 0.0_wp) relaxing%stiffness(a:b) = 0.0_wp
+    end associate
+  end subroutine new_relaxing
 
   !> What rows lo to hi keep of their force as they flow: 1 / (1 + kappa E d alpha / (beta sigma)).
   pure subroutine let_go(self, lo, hi, flow, memory, rows)

@@ -5,6 +5,7 @@ module pd_shape_tensor
   use pd_errors, only: error_list_t
   use pd_kinds, only: wp
   use pd_operators, only: operators_t
+  use pd_pages, only: clear_rows
   implicit none
   private
 
@@ -26,13 +27,14 @@ contains
     real(wp), allocatable :: k(:, :)
     real(wp) :: mean, radius, determinant
     character(160) :: text
-    integer  :: i, n_singular
+    integer  :: i, n_singular, singular(operators%domain%blocks%count)
 
-    allocate (k(operators%n, 3))
+    allocate (k(operators%n, 3), operators%k_inverse(operators%n, 3))
+    call clear_rows(k, operators%storage%kept)
+    call clear_rows(operators%k_inverse, operators%storage%kept)
     call operators%shape_tensor(k)
-    allocate (operators%k_inverse(operators%n, 3), source=0.0_wp)
     n_singular = 0
-    do i = 1, operators%n
+    do i = operators%domain%blocks%first, operators%domain%blocks%last
       if (volume(i) <= 0.0_wp) cycle
       mean = 0.5_wp * (k(i, 1) + k(i, 2))
       radius = sqrt((0.5_wp * (k(i, 1) - k(i, 2)))**2 + k(i, 3)**2)
@@ -50,8 +52,12 @@ contains
           'one line', trim(text), allowed='condition number below 1e6; a larger horizon helps')
       end if
     end do
-    if (n_singular > most_reported) then
-      write (text, '(i0,a)') n_singular - most_reported, ' more points have a singular shape tensor'
+    ! what other ranks have found is counted: the first that has found something tells
+    singular = 0
+    if (size(singular) > 0) singular(1) = n_singular
+    i = nint(operators%domain%blocks%total(real(singular, wp))) - min(n_singular, most_reported)
+    if (n_singular > 0 .and. i > 0) then
+      write (text, '(i0,a)') i, ' more points have a singular shape tensor'
       call errors%add(trim(text))
     end if
   end subroutine invert_shape_tensors

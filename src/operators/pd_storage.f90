@@ -7,6 +7,7 @@
 module pd_storage
   use pd_families, only: horizon_t
   use pd_kinds, only: n_line, wp
+  use pd_pages, only: clear_rows
   implicit none
   private
 
@@ -19,11 +20,17 @@ module pd_storage
     integer :: stride = 0                  !! rows from a line of the lattice to the next; 0: a list
     integer :: ends(2) = 0                 !! first and last row that may hold a point
     integer, allocatable :: row(:)         !! of every point, ascending (n)
+    !> Rows that this rank keeps, and the points that give them values: all of them until the
+    !> body is divided.
+    integer :: kept(2) = [1, 0]
+    integer :: points(2) = [1, 0]
   contains
     procedure, private :: spread_values
     procedure, private :: spread_tensors
     procedure, private :: spread_numbers
     generic :: spread => spread_values, spread_tensors, spread_numbers
+    procedure :: keep
+    procedure :: take_shares
     procedure :: point_at
     procedure :: first_point
     procedure :: around
@@ -41,6 +48,7 @@ contains
     storage%ends = [1, n]
     allocate (storage%row(n))
     storage%row = [(i, i=1, n)]
+    call storage%keep([1, n])
   end function listed_storage
 
   !> Rows for the box of places around the points of a lattice, line by line, with a margin, so that
@@ -71,7 +79,18 @@ contains
     storage%ends = [storage%row(1), storage%row(storage%n)]
     if (present(box)) storage%ends = margin + 1 + [storage%stride * reach, &
       high(1) - low(1) + storage%stride * (high(2) - low(2) + reach)]
+    call storage%keep([1, storage%rows])
   end function lattice_storage
+
+  !> From now on this rank keeps these rows only.
+  pure subroutine keep(self, kept)
+    class(storage_t), intent(inout) :: self
+    integer,          intent(in)    :: kept(2)   !! first and last
+
+    self%kept = kept
+    ! rows without a point look at the one before them
+    self%points = [max(1, self%first_point(kept(1)) - 1), self%first_point(kept(2) + 1) - 1]
+  end subroutine keep
 
   !> First row in the cache line of a row: blocks begin there.
   pure integer function line_start(row)
@@ -87,39 +106,74 @@ contains
     rows = n_line * ((count + n_line - 1) / n_line)
   end function whole_lines
 
-  !> A field of the points, in rows; 0 in the others.
-  pure function spread_values(self, values) result(field)
-    class(storage_t), intent(in) :: self
-    real(wp),         intent(in) :: values(:)   !! (n)
-    real(wp), allocatable :: field(:)           !! (rows)
+  !> What the points have of a whole cell, as far around the rows that are kept as families reach.
+  subroutine take_shares(self, share, weighs, field)
+    class(storage_t), intent(in)  :: self
+    real(wp),         intent(in)  :: share(:)   !! of every point (n)
+    logical,          intent(out) :: weighs     !! some have less or more than a whole cell
+    real(wp), allocatable, intent(out) :: field(:)   !! (rows)
+    real(wp), parameter :: round_off = 1.0e-12_wp
+    integer :: around(2), i
 
-    allocate (field(self%rows), source=0.0_wp)
-    field(self%row) = values
+    weighs = any(share > 0.0_wp .and. abs(share - 1.0_wp) > round_off)
+    around = self%kept + self%reach * (self%stride + 1) * [-1, 1]
+    allocate (field(self%rows))
+    call clear_rows(field, around)
+    do i = self%first_point(around(1)), self%first_point(around(2) + 1) - 1
+      field(self%row(i)) = merge(share(i), anint(share(i)), weighs)
+    end do
+  end subroutine take_shares
+
+  !> A field of the points, in the rows that are kept; 0 in the others.
+  function spread_values(self, values) result(field)
+    class(storage_t), intent(in) :: self
+    real(wp),         intent(in) :: values(:)   !! of all points, or of self%points
+    real(wp), allocatable :: field(:)           !! (rows)
+    integer :: i, shift
+
+    allocate (field(self%rows))
+    call clear_rows(field, self%kept)
+    shift = merge(0, self%points(1) - 1, size(values) == self%n)
+    do i = self%points(1), self%points(2)
+      field(self%row(i)) = values(i - shift)
+    end do
   end function spread_values
 
   !> A field with components.
-  pure function spread_tensors(self, values) result(field)
+  function spread_tensors(self, values) result(field)
     class(storage_t), intent(in) :: self
-    real(wp),         intent(in) :: values(:, :)   !! (n, components)
+    real(wp),         intent(in) :: values(:, :)   !! (points, components)
     real(wp), allocatable :: field(:, :)           !! (rows, components)
+    integer :: c, i, shift
 
-    allocate (field(self%rows, size(values, 2)), source=0.0_wp)
-    field(self%row, :) = values
+    allocate (field(self%rows, size(values, 2)))
+    call clear_rows(field, self%kept)
+    shift = merge(0, self%points(1) - 1, size(values, 1) == self%n)
+    do c = 1, size(values, 2)
+      do i = self%points(1), self%points(2)
+        field(self%row(i), c) = values(i - shift, c)
+      end do
+    end do
   end function spread_tensors
 
   !> A field of whole numbers; rows without a point have the number of the last point before them,
   !> or of the first one.
   pure function spread_numbers(self, values) result(field)
     class(storage_t), intent(in) :: self
-    integer,          intent(in) :: values(:)   !! (n)
-    integer, allocatable :: field(:)            !! (rows)
-    integer :: k
+    integer,          intent(in) :: values(:)   !! of all points, or of self%points
+    integer, allocatable :: field(:)            !! (rows); of those that are not kept: anything
+    integer :: k, shift
 
-    allocate (field(self%rows), source=values(1))
-    do k = 1, self%n - 1
-      field(self%row(k):self%row(k + 1) - 1) = values(k)
-    end do
-    field(self%row(self%n):) = values(self%n)
+    allocate (field(self%rows))
+    associate (a => self%points(1), b => self%points(2))
+      if (b < a) return
+      shift = merge(0, a - 1, size(values) == self%n)
+      field(self%kept(1):self%row(a) - 1) = values(a - shift)
+      do k = a, b - 1
+        field(self%row(k):self%row(k + 1) - 1) = values(k - shift)
+      end do
+      field(self%row(b):self%kept(2)) = values(b - shift)
+    end associate
   end function spread_numbers
 
   !> The point of a row; the one before it where the row holds none.

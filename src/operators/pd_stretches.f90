@@ -29,9 +29,9 @@ module pd_stretches
 contains
 
   !> Stretches of the rows that hold a point; they begin at lines of the cache, as blocks do.
-  pure type(stretches_t) function new_stretches(blocks, holds) result(stretches)
+  pure type(stretches_t) function new_stretches(blocks, share) result(stretches)
     type(blocks_t), intent(in) :: blocks
-    logical,        intent(in) :: holds(:)   !! whether a row holds a point (n)
+    real(wp),       intent(in) :: share(:)   !! of a cell; 0: a row without a point (n)
     integer :: block, i, n, pass, line   ! line: last row of the stretch so far
 
     stretches%first_row = blocks%first
@@ -42,7 +42,7 @@ contains
         stretches%first(block) = n + 1
         line = blocks%lo(block) - 1
         do i = blocks%lo(block), blocks%hi(block), n_line
-          if (.not. any(holds(i:min(i + n_line - 1, blocks%hi(block))))) cycle
+          if (.not. any(share(i:min(i + n_line - 1, blocks%hi(block))) > 0.0_wp)) cycle
           if (n < stretches%first(block) .or. i - line > shortest_gap) then
             n = n + 1
             if (pass == 2) stretches%lo(n) = merge(i, line + 1, i - line > shortest_gap)

@@ -11,10 +11,11 @@ module pd_checkpoint
   use pd_errors, only: error_list_t
   use pd_fields, only: field_visitor_t, state_field_t
   use pd_files, only: file_exists, patch_file, replace_file, sync_file
-  use pd_gather, only: gather_fields, gather_values
   use pd_hdf5, only: close_file, create_file, create_group, hdf5_file_t, open_file, &
     read_attribute, read_dataset, write_attribute, write_dataset
   use pd_kinds, only: i8, wp
+  use pd_parts, only: as_column, write_in_parts
+  use pd_points, only: points_t
   use pd_state, only: state_t
   use pd_step_limit, only: step_limit_t
   use pd_system, only: remove_file, rename_file
@@ -101,13 +102,14 @@ contains
   !> hand in.
   !>
   !> Errors: it cannot be written; the checkpoints so far are then as they were.
-  subroutine write_checkpoint(stem, checkpoint, state, rows, errors, blocks)
+  subroutine write_checkpoint(stem, checkpoint, state, rows, errors, blocks, points)
     character(*),       intent(in)    :: stem   !! output folder and name of the run
     type(checkpoint_t), intent(in)    :: checkpoint
     class(state_t),     intent(inout) :: state   !! visited, not changed
     integer,            intent(in)    :: rows(:) !! of the state that belong to points, in order
     type(error_list_t), intent(inout) :: errors
     type(blocks_t), optional, intent(in) :: blocks   !! of this rank; absent: all
+    type(points_t), optional, intent(in) :: points   !! absent: they are in the checkpoint
     character(:), allocatable :: temporary
     type(writing_t) :: writer
     integer :: before
@@ -117,15 +119,15 @@ contains
     temporary = newest(stem)//'.tmp'
     writer%rows = rows
     if (present(blocks)) writer%blocks = blocks
-    if (writer%blocks%ranks%mine > 0) then
-      call state%visit(writer)
-      return
+    if (writer%blocks%ranks%mine == 0) then
+      call create_file(writer%file, temporary, head_length, errors)
+      call write_numbers(writer%file, checkpoint, errors)
+      call create_group(writer%file, '/state', errors)
     end if
-    call create_file(writer%file, temporary, head_length, errors)
-    call write_numbers(writer%file, checkpoint, errors)
-    call create_group(writer%file, '/state', errors)
     writer%errors = errors
+    if (present(points)) call write_points(writer, points)
     call state%visit(writer)
+    if (writer%blocks%ranks%mine > 0) return
     errors = writer%errors
     call close_file(writer%file, errors)
     if (errors%count() == before) call patch_file(temporary, 0_i8, head(temporary), errors)
@@ -196,36 +198,52 @@ contains
     call write_dataset(file, '/ledger', checkpoint%ledger, errors)
     call write_dataset(file, '/ledger_blocks', checkpoint%ledger_blocks, errors)
     call write_dataset(file, '/input', checkpoint%input, errors)
-    call write_dataset(file, '/position', checkpoint%position, errors)
-    call write_dataset(file, '/volume', checkpoint%volume, errors)
+    if (allocated(checkpoint%position)) then
+      call write_dataset(file, '/position', checkpoint%position, errors)
+      call write_dataset(file, '/volume', checkpoint%volume, errors)
+    end if
     call write_dataset(file, '/boundary', checkpoint%boundary, errors)
     call write_dataset(file, '/changes', checkpoint%changes, errors)
   end subroutine write_numbers
+
+  !> Positions and volumes of points of which each rank knows its own.
+  subroutine write_points(self, points)
+    class(writing_t), intent(inout) :: self
+    type(points_t),   intent(in)    :: points
+
+    call write_in_parts(self%file, '/position', self%blocks, self%rows, points%position, &
+      self%errors)
+    call write_in_parts(self%file, '/volume', self%blocks, self%rows, as_column(points%volume), &
+      self%errors)
+  end subroutine write_points
 
   subroutine write_1(self, about, values)
     class(writing_t),      intent(inout) :: self
     type(state_field_t),   intent(in)    :: about
     real(wp), allocatable, intent(inout) :: values(:)
-    real(wp), allocatable :: at_points(:)
 
     if (.not. about%kept) return
-    call gather_values(self%blocks, self%rows, values, at_points)
-    if (self%blocks%ranks%mine > 0) return
-    call write_dataset(self%file, place_of(about), at_points, self%errors)
-    call describe(self%file, about, self%errors)
+    if (self%blocks%ranks%count > 1) then
+      call write_in_parts(self%file, place_of(about), self%blocks, self%rows, &
+        as_column(values), self%errors)
+    else
+      call write_dataset(self%file, place_of(about), values(self%rows), self%errors)
+    end if
+    if (self%blocks%ranks%mine == 0) call describe(self%file, about, self%errors)
   end subroutine write_1
 
   subroutine write_2(self, about, values)
     class(writing_t),      intent(inout) :: self
     type(state_field_t),   intent(in)    :: about
     real(wp), allocatable, intent(inout) :: values(:, :)
-    real(wp), allocatable :: at_points(:, :)
 
     if (.not. about%kept) return
-    call gather_fields(self%blocks, self%rows, values, at_points)
-    if (self%blocks%ranks%mine > 0) return
-    call write_dataset(self%file, place_of(about), at_points, self%errors)
-    call describe(self%file, about, self%errors)
+    if (self%blocks%ranks%count > 1) then
+      call write_in_parts(self%file, place_of(about), self%blocks, self%rows, values, self%errors)
+    else
+      call write_dataset(self%file, place_of(about), values(self%rows, :), self%errors)
+    end if
+    if (self%blocks%ranks%mine == 0) call describe(self%file, about, self%errors)
   end subroutine write_2
 
   pure function place_of(about) result(place)

@@ -3,13 +3,13 @@ module pd_frames
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   use pd_errors, only: error_list_t
   use pd_frame_fields, only: fill_field, frame_field_t
-  use pd_gather, only: gather_points
   use pd_hdf5, only: create_group, flush_file, hdf5_file_t, overwrite_rows, read_attribute, &
     read_rows, reserve_dataset, write_attribute
   use pd_kinds, only: wp
   use pd_labels, only: label_t
   use pd_model, only: model_t
   use pd_observe, only: moment_t
+  use pd_parts, only: put_parts
   use pd_state, only: state_t
   implicit none
   private
@@ -98,9 +98,12 @@ contains
     do i = 1, size(fields)
       allocate (values(fields(i)%width(), model%shown%n))
       call fill_field(fields(i), model, state, values)
-      call gather_points(model%blocks, model%shown%row, values)
-      if (model%blocks%ranks%mine == 0) &
+      if (model%blocks%ranks%count > 1) then
+        call put_parts(file, place_of(group, fields(i)), model%blocks, model%shown%row, values, &
+          errors)
+      else
         call overwrite_rows(file, place_of(group, fields(i)), values, errors)
+      end if
       deallocate (values)
     end do
     if (model%blocks%ranks%mine == 0) call flush_file(file, errors)

@@ -97,7 +97,7 @@ contains
     integer  :: i, k
 
     i = row%model%probes(row%probe)%row
-    k = row%model%materials%material_of(i)
+    k = row%model%probes(row%probe)%material
     stress = row%model%materials%list(k)%measure%cauchy(row%state%displacement_gradient(i, :), &
       row%state%stress(i, :))
     value = stress(row%component)
@@ -109,7 +109,7 @@ contains
 
     value = 0.0_wp
     i = row%model%probes(row%probe)%row
-    k = row%model%materials%material_of(i)
+    k = row%model%probes(row%probe)%material
     column = row%model%materials%list(k)%law%plastic_strain
     if (column > 0) value = row%state%history(i, column)
   end function probe_plastic_strain

@@ -22,7 +22,7 @@ module pd_hdf5
   public :: hdf5_file_t, create_file, open_file, flush_file, close_file
   public :: create_group, object_exists, remove_object
   public :: reserve_dataset, reserve_whole_numbers
-  public :: write_dataset, overwrite_dataset, overwrite_rows, overwrite_part
+  public :: write_dataset, overwrite_dataset, overwrite_rows, overwrite_part, overwrite_some_rows
   public :: read_dataset, read_rows
   public :: write_attribute, read_attribute
 
@@ -212,24 +212,34 @@ contains
     integer,            intent(in)    :: first
     real(wp),           intent(in)    :: values(:)
     type(error_list_t), intent(inout) :: errors
-    real(wp), allocatable, target :: buffer(:)
+
+    call overwrite_some_rows(file, name, first, reshape(values, [1, size(values)]), errors)
+  end subroutine overwrite_part
+
+  !> The same with all components of a point together; with one component the dataset has rank 1.
+  subroutine overwrite_some_rows(file, name, first, values, errors)
+    type(hdf5_file_t),  intent(inout) :: file
+    character(*),       intent(in)    :: name
+    integer,            intent(in)    :: first
+    real(wp), target,   intent(in), contiguous :: values(:, :)   !! (components,points)
+    type(error_list_t), intent(inout) :: errors
     integer(hid_t)   :: dataset, space, part
-    integer(hsize_t) :: start(1), length(1)
-    integer :: status, ignored
+    integer(hsize_t) :: start(2), length(2)
+    integer :: axis, status, ignored   ! axis: the first that the dataset has
 
     if (.not. file%is_good() .or. size(values) == 0) return
-    allocate (buffer, source=values)
-    start = int(first - 1, hsize_t)
-    length = size(values, kind=hsize_t)
+    start = int([0, first - 1], hsize_t)
+    length = shape(values, kind=hsize_t)
+    axis = merge(2, 1, size(values, 1) == 1)
     call h5dopen_f(file%id, name, dataset, status)
     call check(file, status, name//' cannot be opened', errors)
     if (file%failed) return
     call h5dget_space_f(dataset, space, status)
     if (status >= 0) then
-      call h5sselect_hyperslab_f(space, h5s_select_set_f, start, length, status)
-      if (status >= 0) call h5screate_simple_f(1, length, part, status)
+      call h5sselect_hyperslab_f(space, h5s_select_set_f, start(axis:), length(axis:), status)
+      if (status >= 0) call h5screate_simple_f(3 - axis, length(axis:), part, status)
       if (status >= 0) then
-        call h5dwrite_f(dataset, h5t_native_double, c_loc(buffer), status, part, space)
+        call h5dwrite_f(dataset, h5t_native_double, c_loc(values), status, part, space)
         call h5sclose_f(part, ignored)
       end if
       call h5sclose_f(space, ignored)
@@ -237,7 +247,7 @@ contains
     call check(file, status, name//' cannot be written', errors)
     call h5dclose_f(dataset, status)
     if (.not. file%failed) call check(file, status, name//' cannot be written', errors)
-  end subroutine overwrite_part
+  end subroutine overwrite_some_rows
 
   subroutine write_integer_1(file, name, values, errors)
     type(hdf5_file_t),  intent(inout) :: file

@@ -23,6 +23,7 @@ module pd_record
   use pd_ledger, only: ledger_t
   use pd_model, only: model_t
   use pd_observe, only: column_t, moment_at, moment_t, observation_t, observe
+  use pd_parts_of_points, only: hand_in_points
   use pd_progress, only: close_progress, open_progress, progress_t, say, show_progress, status_t
   use pd_result, only: add_row, attend_result, create_result, finish_result, places_t, &
     result_t, resume_result, write_failed_frame, write_frame, write_rows, write_tries
@@ -76,14 +77,9 @@ contains
     type(record_t),     intent(out)   :: record
     type(error_list_t), intent(inout) :: errors
     type(run_description_t) :: description
-    real(wp), allocatable :: rows(:, :)
-    logical :: restart
-    integer :: of_safety   ! frames of the search for the factor of safety
 
-    of_safety = 2 * size(input%strength_reduction)
     record%stem = input%run%output_dir//'/'//input%run%name
     record%values = used_values(input)
-    restart = checkpoint%history_rows > 0
     call describe_run(input, provenance, model, schedule, description)
     description%values = record%values
     description%time_step = checkpoint%clock%time_step
@@ -92,11 +88,34 @@ contains
     if (record%elsewhere) then
       call attend_result(record%result, record%stem, description, places_t())
       record%frames = checkpoint%frames_written
-      return
+    else
+      call open_files(input, checkpoint, schedule, description, record, errors)
     end if
+    if (description%in_parts) then
+      if (any_rank(model%blocks%ranks, errors%count() > 0)) return
+      call hand_in_points(record%stem//'.h5', allocated(description%yield_stress), model, errors)
+    end if
+    ! what mpirun passes on looks like a terminal
+    if (errors%count() == 0 .and. .not. record%elsewhere) call open_progress(record%progress, &
+      record%stem, checkpoint%history_rows > 0, quiet, errors, &
+      plain=model%blocks%ranks%count > 1)
+  end subroutine open_record
+
+  !> Open the result file and the history.
+  subroutine open_files(input, checkpoint, schedule, description, record, errors)
+    type(input_t),      intent(in)    :: input
+    type(checkpoint_t), intent(in)    :: checkpoint   !! history_rows 0: a new run
+    type(schedule_t),   intent(in)    :: schedule
+    type(run_description_t), intent(in) :: description
+    type(record_t),     intent(inout) :: record
+    type(error_list_t), intent(inout) :: errors
+    real(wp), allocatable :: rows(:, :)
+    integer :: of_safety   ! frames of the search for the factor of safety
+
+    of_safety = 2 * size(input%strength_reduction)
     call prepare_folder(input%run%output_dir, errors)
     if (errors%count() > 0) return
-    if (restart) then
+    if (checkpoint%history_rows > 0) then
       call read_history(record%stem, record%columns, checkpoint%history_rows, rows, errors)
       if (errors%count() > 0) return
       call resume_result(record%result, record%stem, description, &
@@ -115,10 +134,7 @@ contains
       if (errors%count() == 0) &
         call create_history(record%history, record%stem, record%columns, errors)
     end if
-    ! what mpirun passes on looks like a terminal
-    if (errors%count() == 0) call open_progress(record%progress, record%stem, restart, quiet, &
-      errors, plain=model%blocks%ranks%count > 1)
-  end subroutine open_record
+  end subroutine open_files
 
   !> Everything in the result file except frames and rows.
   subroutine describe_run(input, provenance, model, schedule, description)
@@ -145,9 +161,18 @@ contains
       description%upper = model%whole%upper
     end if
     description%steps = schedule%steps
-    call points_of(model, description%position, description%volume, description%boundary)
+    description%in_parts = model%blocks%ranks%count > 1 .and. model%whole%n == 0
+    if (description%in_parts) then
+      description%boundary = model%body%boundary
+    else
+      call points_of(model, description%position, description%volume, description%boundary)
+    end if
     if (size(model%materials%remembered()) > 0) then
-      description%yield_stress = model%strength(model%shown%row)
+      if (description%in_parts) then
+        allocate (description%yield_stress(0))
+      else
+        description%yield_stress = model%strength(model%shown%row)
+      end if
       if (model%whole%n > 0) description%yield_stress = model%shown_strength
     end if
     if (allocated(model%materials%stiffness)) description%youngs_modulus = &
@@ -403,8 +428,14 @@ contains
     checkpoint%input = record%values
     allocate (checkpoint%changes(n_change, max(1, size(model%supports%items))), source=-1.0_wp)
     checkpoint%changes(:, :size(model%supports%items)) = changes_of(model%supports)
-    call points_of(model, checkpoint%position, checkpoint%volume, checkpoint%boundary)
-    call write_checkpoint(record%stem, checkpoint, state, model%shown%row, errors, model%blocks)
+    if (model%blocks%ranks%count > 1 .and. model%whole%n == 0) then
+      checkpoint%boundary = model%body%boundary
+      call write_checkpoint(record%stem, checkpoint, state, model%shown%row, errors, model%blocks, &
+        model%points)
+    else
+      call points_of(model, checkpoint%position, checkpoint%volume, checkpoint%boundary)
+      call write_checkpoint(record%stem, checkpoint, state, model%shown%row, errors, model%blocks)
+    end if
   end subroutine put_checkpoint
 
   !> Read the newest checkpoint and compare its input with the present one. The state has one row

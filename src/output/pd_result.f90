@@ -361,7 +361,7 @@ contains
     type(places_t),          intent(in)    :: places
 
     result%path = stem//'.h5'
-    result%n = size(description%volume)
+    result%n = size(description%boundary)
     result%places = places
     result%fields = description%fields
     result%columns = description%columns

@@ -7,6 +7,7 @@ module pd_run_description
   use pd_kinds, only: wp
   use pd_labels, only: label_t
   use pd_observe, only: column_t
+  use pd_parts, only: reserve_values
   use pd_system, only: host_name, process_number
   use pd_text, only: integer_text
   use pd_trust, only: reserve_trust
@@ -36,6 +37,8 @@ module pd_run_description
     real(wp) :: lower(2) = 0.0_wp, upper(2) = 0.0_wp               !! extents of the body [m]
     real(wp) :: time_step = 0.0_wp                                 !! [s]
     integer  :: steps = 0                                          !! of the whole run
+    logical :: in_parts = .false.              !! positions, volumes and yield stresses come
+                                               !! later, from every rank (`hand_in_points`)
     real(wp), allocatable :: position(:, :)    !! (n,2) [m]
     real(wp), allocatable :: volume(:)         !! (n) [m^2]
     integer,  allocatable :: boundary(:)       !! (n) 0: body, k: boundary k
@@ -126,10 +129,15 @@ contains
     type(error_list_t),      intent(inout) :: errors
 
     call create_group(file, '/points', errors)
-    call write_dataset(file, '/points/position', description%position, errors)
+    if (description%in_parts) then
+      call reserve_values(file, '/points/position', [size(description%boundary), 2], errors)
+      call reserve_values(file, '/points/volume', [size(description%boundary), 1], errors)
+    else
+      call write_dataset(file, '/points/position', description%position, errors)
+      call write_dataset(file, '/points/volume', description%volume, errors)
+    end if
     call write_label(file, '/points/position', label_t('', 'm', 'reference position'), errors)
     call write_attribute(file, '/points/position', 'components', 'x y', errors)
-    call write_dataset(file, '/points/volume', description%volume, errors)
     call write_label(file, '/points/volume', label_t('', 'm^2', &
       'volume of a point per unit of thickness'), errors)
     call write_dataset(file, '/points/boundary', description%boundary, errors)
@@ -137,7 +145,11 @@ contains
       'boundary that a fictitious point belongs to, counted from 1; 0: a point of the body'), &
       errors)
     if (allocated(description%yield_stress)) then
-      call write_dataset(file, '/points/yield_stress', description%yield_stress, errors)
+      if (description%in_parts) then
+        call reserve_values(file, '/points/yield_stress', [size(description%boundary), 1], errors)
+      else
+        call write_dataset(file, '/points/yield_stress', description%yield_stress, errors)
+      end if
       call write_label(file, '/points/yield_stress', label_t('', 'Pa', &
       'initial yield stress'), errors)
     end if

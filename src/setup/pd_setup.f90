@@ -1,14 +1,17 @@
 !> From checked input and a body to the model: operators, materials, supports, loads.
 module pd_setup
+  use pd_agreement, only: any_rank
   use pd_balance, only: balance_list, balance_t, look_for_balance
   use pd_balanced_list, only: balanced_list_t
   use pd_bond_list, only: bond_list_t, new_bond_list
   use pd_errors, only: error_list_t
   use pd_families, only: horizon_t, new_horizon
+  use pd_input_shapes, only: is_bearing
   use pd_input_types, only: input_t
-  use pd_kinds, only: wp
+  use pd_kinds, only: is_set, wp
   use pd_lattice, only: lattice_operators_t, new_lattice_operators
   use pd_model, only: model_t
+  use pd_ranks, only: ranks_t
   use pd_setup_gradients, only: check_gradients
   use pd_setup_gravity, only: set_up_gravity
   use pd_setup_initial_stress, only: set_up_initial_stress
@@ -24,7 +27,7 @@ module pd_setup
   implicit none
   private
 
-  public :: set_up_model
+  public :: set_up_model, looks_near
 
 contains
 
@@ -35,15 +38,20 @@ contains
   !> density, a relaxing control of families whose bonds are all equally long, a gradient that
   !> leaves nothing of a material, a probe far from the body, an initial stress beyond the yield
   !> stress.
-  subroutine set_up_model(input, model, errors, stage)
+  !>
+  !> `ranks`: each has its own part of a lattice from the start, unless something looks farther than
+  !> a horizon and the supports. Errors may be those of one rank only.
+  subroutine set_up_model(input, model, errors, stage, ranks)
     type(input_t),      intent(in)    :: input
     type(model_t),      intent(inout) :: model    !! in: with its body
     type(error_list_t), intent(inout) :: errors
     type(stage_t), optional, intent(in) :: stage  !! absent: the first
+    type(ranks_t), optional, intent(in) :: ranks  !! absent: the model is whole
     type(stage_t) :: present_stage
     type(horizon_t) :: horizon
     type(sight_t), allocatable :: sight
-    integer :: rows   ! of points in a layer
+    type(ranks_t) :: parts   ! the ranks that have a part each
+    integer :: rows          ! of points in a layer
 
     present_stage = first_stage(input)
     if (present(stage)) present_stage = stage
@@ -54,14 +62,18 @@ contains
     call look_around(input, horizon, model%body, sight, errors)
     if (errors%count() > 0) return
     rows = ceiling(model%delta / model%spacing - 1.0e-6_wp)
-    call choose_operators(horizon, input%run%operators, sight, model, errors)
+    if (present(ranks)) then
+      if (looks_near(input, model)) parts = ranks
+    end if
+    call choose_operators(horizon, input%run%operators, sight, parts, model, errors)
     if (errors%count() > 0) return
+    if (allocated(sight)) deallocate (sight)
     model%blocks = model%operators%domain%blocks
     model%shown = model%operators%storage
     if (model%whole%n > 0) model%shown = lattice_storage(horizon, model%spacing, model%whole%place)
     call set_up_points(model)
     call invert_shape_tensors(model%operators, model%points%position, model%points%volume, errors)
-    if (errors%count() > 0) return
+    if (any_rank(model%blocks%ranks, errors%count() > 0)) return
     if (.not. allocated(model%body%place)) call balance_cloud(input, model)
     call set_up_materials(input, present_stage, model)
     call check_gradients(input, model, errors)
@@ -74,16 +86,38 @@ contains
     call set_up_gravity(input, model)
     call set_up_damping(input, model)
     call set_up_probes(input, model, errors)
-    if (.not. any(model%points%free > 0.0_wp)) call errors%add('no point is free to move')
+    if (.not. any_rank(model%blocks%ranks, any(model%points%free > 0.0_wp))) &
+      call errors%add('no point is free to move')
     if (errors%count() == 0 .and. .not. present_stage%start_time > 0.0_wp) &
       call set_up_initial_stress(input, horizon, model, errors)
   end subroutine set_up_model
 
+  !> Whether nothing in a model looks farther than a horizon, but for supports and probes: neither
+  !> stages, mirrors, loads, initial stress, nor statistics of what varies over the body.
+  pure logical function looks_near(input, model)
+    type(input_t), intent(in) :: input
+    type(model_t), intent(in) :: model
+    integer :: k
+
+    looks_near = model%whole%n == 0 .and. size(input%pressures) == 0 &
+      .and. size(input%gravity%acceleration) == 0 .and. .not. is_set(input%initial_stress%k0) &
+      .and. .not. is_set(input%random_field%coefficient_of_variation)
+    do k = 1, size(input%boundaries)
+      looks_near = looks_near .and. .not. is_bearing(input%boundaries(k))
+    end do
+    do k = 1, size(input%materials)
+      looks_near = looks_near &
+        .and. .not. abs(input%materials(k)%youngs_modulus_gradient) > 0.0_wp &
+        .and. .not. abs(input%materials(k)%yield_stress_gradient) > 0.0_wp
+    end do
+  end function looks_near
+
   !> Lattice operators for a body on a lattice, unless a list is asked for; otherwise the bond list.
-  subroutine choose_operators(horizon, form, sight, model, errors)
+  subroutine choose_operators(horizon, form, sight, ranks, model, errors)
     type(horizon_t),    intent(in)    :: horizon
     character(*),       intent(in)    :: form   !! auto, lattice or list
     type(sight_t), allocatable, intent(in) :: sight   !! not allocated: bonds cross air
+    type(ranks_t),      intent(in)    :: ranks  !! that have a part each of a lattice
     type(model_t),      intent(inout) :: model
     type(error_list_t), intent(inout) :: errors
     type(lattice_operators_t), allocatable :: lattice
@@ -92,7 +126,7 @@ contains
     if (allocated(model%body%place) .and. form /= 'list') then
       allocate (lattice)
       call new_lattice_operators(horizon, model%spacing, model%body%place, model%body%volume, &
-        lattice, sight, model%body%box)
+        lattice, sight, model%body%box, ranks)
       call move_alloc(lattice, model%operators)
     else
       allocate (list)
@@ -131,9 +165,9 @@ contains
 
     model%damping = input%integration%damping
     if (model%platens%axis == 0) return
-    associate (p => model%platens)
-      model%points%place = min(1.0_wp, max(0.0_wp, (model%points%position(:, p%axis) - p%start) &
-        / p%length))
+    associate (p => model%platens, kept => model%operators%storage%kept)
+      model%points%place(kept(1):kept(2)) = min(1.0_wp, max(0.0_wp, &
+        (model%points%position(kept(1):kept(2), p%axis) - p%start) / p%length))
     end associate
     model%damped_in_frame = model%at_equilibrium &   ! the first guess moves with the platens
       .or. input%integration%damping_frame == 'platens'

@@ -12,7 +12,7 @@ module pd_setup_gradients
   implicit none
   private
 
-  public :: yield_stress_at, set_up_stiffness, stiffness_of_points, check_gradients
+  public :: yield_stress_at, set_up_stiffness, check_gradients
 
 contains
 
@@ -69,10 +69,12 @@ contains
     type(input_t),      intent(in)    :: input
     type(model_t),      intent(in)    :: model
     type(error_list_t), intent(inout) :: errors
-    real(wp) :: stiffness(model%operators%storage%n)
+    real(wp), allocatable :: stiffness(:)
     integer  :: i, k
 
-    stiffness = stiffness_of_points(model)
+    if (.not. (allocated(model%materials%stiffness) .or. &
+      any(input%materials%yield_stress_gradient < 0.0_wp))) return
+    allocate (stiffness, source=stiffness_of_points(model))
     if (any(stiffness <= 0.0_wp)) call report('youngs_modulus_gradient', minloc(stiffness, dim=1))
     if (.not. any(input%materials%yield_stress_gradient < 0.0_wp)) return
     do i = 1, size(stiffness)

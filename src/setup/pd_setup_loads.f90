@@ -11,6 +11,7 @@ module pd_setup_loads
   use pd_loaded_platen, only: loaded_platen_t, new_loaded_platen
   use pd_loads, only: load_t
   use pd_model, only: model_t
+  use pd_pages, only: clear_rows
   use pd_platens, only: new_platens
   use pd_point_sets, only: boundary_set, point_set_t, side_t
   use pd_pressure, only: new_pressure, pressure_t, spread_on_edges, spread_on_side, surface_t
@@ -38,12 +39,20 @@ contains
     type(model_t),      intent(inout) :: model
     type(error_list_t), intent(inout) :: errors
     real(wp), allocatable :: density(:), mass(:)
-    integer :: k, n
+    integer :: i, k, n
 
     n = size(model%points%volume)
-    allocate (density(n), source=model%materials%density_of(n))
-    allocate (mass(n), source=density * model%points%volume)
-    if (model%at_equilibrium) mass = 0.0_wp   ! nothing has kinetic energy
+    allocate (density(n), mass(n))
+    call clear_rows(density, [1, 0])
+    call clear_rows(mass, [1, 0])
+    do i = 1, model%body%n   ! of the points of boundaries, on every rank
+      if (model%body%boundary(i) == 0) cycle
+      associate (row => model%operators%storage%row(i))
+        density(row) = model%materials%list(stage%material_of(model%body%part(i)))%density
+        if (model%at_equilibrium) cycle   ! nothing has kinetic energy
+        mass(row) = density(row) * model%points%volume(row)
+      end associate
+    end do
     allocate (model%supports%items(size(input%boundaries)))
     do k = 1, size(input%boundaries)
       call new_support(input%boundaries, k, stage%boundary_since(k), mass, model, &

@@ -18,9 +18,10 @@ module pd_setup_materials
   use pd_measure, only: measure_t
   use pd_model, only: model_t, top_of
   use pd_operators, only: control_stiffness
+  use pd_pages, only: clear_rows
   use pd_random_field, only: lognormal, new_random_field, standard_normal
-  use pd_relaxing, only: new_relaxing, whole_family, whole_family_t
-  use pd_setup_gradients, only: set_up_stiffness, stiffness_of_points, yield_stress_at
+  use pd_relaxing, only: new_relaxing, relaxing_t, whole_family, whole_family_t
+  use pd_setup_gradients, only: set_up_stiffness, yield_stress_at
   use pd_small_strain, only: small_strain_t
   use pd_stages, only: stage_t, stages_of
   implicit none
@@ -34,13 +35,28 @@ contains
   subroutine set_up_points(model)
     type(model_t), intent(inout) :: model
 
+    integer :: i
+
     associate (points => model%points, body => model%body, storage => model%operators%storage)
       points%position = storage%spread(body%position)
       if (model%whole%n > 0) points%position = model%shown%spread(model%whole%position)
       points%volume = storage%spread(body%volume)
-      points%in_body = storage%spread(merge(1.0_wp, 0.0_wp, body%boundary == 0))
-      points%free = spread(storage%spread(spread(1.0_wp, 1, body%n)), 2, 2)
-      allocate (points%place(storage%rows), source=0.0_wp)
+      allocate (points%in_body(storage%rows), points%place(storage%rows))
+      allocate (points%free(storage%rows, 2))
+      call clear_rows(points%in_body, storage%kept)
+      call clear_rows(points%place, storage%kept)
+      call clear_rows(points%free, storage%kept)
+      do i = storage%points(1), storage%points(2)
+        if (body%boundary(i) == 0) points%in_body(storage%row(i)) = 1.0_wp
+        points%free(storage%row(i), :) = 1.0_wp
+      end do
+      do i = 1, body%n   ! supports look at theirs, on every rank
+        if (body%boundary(i) == 0) cycle
+        points%position(storage%row(i), :) = body%position(i, :)
+        points%volume(storage%row(i)) = body%volume(i)
+      end do
+      points%all_volume = sum(body%volume)
+      points%largest_volume = maxval(body%volume)
     end associate
   end subroutine set_up_points
 
@@ -63,15 +79,18 @@ contains
         allocate (material%law, source=new_law(given))
       end associate
     end do
-    allocate (material_of(model%body%n), strength(model%body%n))
-    material_of = stage%material_of(model%body%part)
-    law_of = material_of
-    call set_up_bearings(input, law_of, model)
-    call divide_into_runs(model%blocks, model%operators%storage%spread(law_of), model%materials)
-    call leave_out_gaps(model%operators%stretches, model%materials)
-    call set_up_stiffness(input, material_of, model)
-    call set_up_strength(input, material_of, model%body%position, top_of(model), strength)
-    model%strength = model%operators%storage%spread(strength)
+    associate (a => model%operators%storage%points(1), b => model%operators%storage%points(2))
+      material_of = stage%material_of(model%body%part(a:b))
+      law_of = material_of
+      call set_up_bearings(input, law_of, model)
+      call divide_into_runs(model%blocks, model%operators%storage%spread(law_of), model%materials)
+      call leave_out_gaps(model%operators%stretches, model%materials)
+      call note_used(model)
+      call set_up_stiffness(input, material_of, model)
+      allocate (strength(size(material_of)))
+      call set_up_strength(input, material_of, model%body%position(a:b, :), top_of(model), strength)
+      model%strength = model%operators%storage%spread(strength)
+    end associate
     if (model%whole%n > 0) then
       associate (stages => stages_of(input))
         allocate (model%shown_strength(model%whole%n))
@@ -82,6 +101,16 @@ contains
     if (input%stabilisation%method == 'silling') &
       call set_up_control(input%stabilisation%factor, law_of, model)
   end subroutine set_up_materials
+
+  !> Which materials the body has, on any rank.
+  subroutine note_used(model)
+    type(model_t), intent(inout) :: model
+    integer :: found(size(model%materials%list)), k
+
+    found = [(merge(1, 0, model%materials%is_used(k)), k=1, size(found))]
+    call model%blocks%ranks%largest_numbers(found)
+    model%materials%used = found > 0
+  end subroutine note_used
 
   !> The layers of smooth boundaries that hold a part of a side, or an edge, become bearings: one
   !> for each material that they would continue, behind those of the input.
@@ -141,14 +170,23 @@ contains
   !> Control of zero-energy modes after Silling, with the stiffness of each point's material.
   subroutine set_up_control(factor, material_of, model)
     real(wp),      intent(in)    :: factor           !! g
-    integer,       intent(in)    :: material_of(:)   !! of every point
+    integer,       intent(in)    :: material_of(:)   !! of the points that give rows values
     type(model_t), intent(inout) :: model
     real(wp), allocatable :: c(:)
+    real(wp) :: youngs_modulus
+    integer  :: i, row
 
     associate (storage => model%operators%storage)
-      allocate (c(storage%n))
-      c = control_stiffness(factor, model%materials%list(material_of)%youngs_modulus &
-        * stiffness_of_points(model), model%delta, model%operators%weight_sum(storage%row))
+      allocate (c(size(material_of)), source=0.0_wp)
+      do i = 1, size(c)
+        row = storage%row(storage%points(1) + i - 1)
+        if (row < storage%kept(1)) cycle
+        youngs_modulus = model%materials%list(material_of(i))%youngs_modulus
+        if (allocated(model%materials%stiffness)) &
+          youngs_modulus = youngs_modulus * model%materials%stiffness(row)
+        c(i) = control_stiffness(factor, youngs_modulus, model%delta, &
+          model%operators%weight_sum(row))
+      end do
       call model%operators%set_control(storage%spread(c))
     end associate
   end subroutine set_up_control
@@ -164,6 +202,7 @@ contains
     type(error_list_t), intent(inout) :: errors
     real(wp), parameter :: fine = 64.0_wp   !! points per horizon that make a disc
     type(whole_family_t)  :: family
+    type(relaxing_t), allocatable :: relaxing
     real(wp), allocatable :: youngs_modulus(:)
     logical :: turns
     integer :: k
@@ -180,7 +219,8 @@ contains
         allowed='a horizon of at least 1.5 spacings, or method = ''none'' or ''silling''')
       return
     end if
-    allocate (youngs_modulus(model%operators%n), source=0.0_wp)
+    allocate (youngs_modulus(model%operators%n))
+    call clear_rows(youngs_modulus, model%operators%storage%kept)
     do k = 1, size(model%materials%runs)
       associate (run => model%materials%runs(k))
         youngs_modulus(run%lo:run%hi) = model%materials%list(run%material)%youngs_modulus
@@ -188,9 +228,9 @@ contains
     end do
     if (allocated(model%materials%stiffness)) &
       youngs_modulus = youngs_modulus * model%materials%stiffness
-    call model%operators%set_relaxing(new_relaxing(family, model%points%volume, youngs_modulus, &
-      model%delta, given%relaxing_stiffness, given%relaxing_strain, turns), &
-      model%points%position)
+    call new_relaxing(family, model%points%volume, youngs_modulus, model%operators%storage%kept, &
+      model%delta, [given%relaxing_stiffness, given%relaxing_strain], turns, relaxing)
+    call model%operators%set_relaxing(relaxing, model%points%position)
   end subroutine set_up_relaxing_control
 
   !> sigma_y0 of every point: that of its material or a random field about it, reduced in the weak

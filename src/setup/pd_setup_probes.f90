@@ -20,7 +20,7 @@ contains
     type(model_t),      intent(inout) :: model
     type(error_list_t), intent(inout) :: errors
     real(wp), parameter :: round_off = 1.0e-6_wp
-    integer :: k, point
+    integer :: k, point, found(size(input%probes))
 
     allocate (model%probes(size(input%probes)))
     do k = 1, size(input%probes)
@@ -29,6 +29,7 @@ contains
           mask=model%body%boundary == 0)
         probe%name = given%name
         probe%row = model%operators%storage%row(point)
+        model%points%position(probe%row, :) = x(point, :)   ! on every rank
         probe%distance = norm2(x(point, :) - [given%x, given%y])
         if (probe%distance > (1.0_wp + round_off) * model%spacing) call errors%add( &
           'a probe is not in the body', '&probe name = '//given%name, &
@@ -37,6 +38,15 @@ contains
           short_number(probe%distance)//' m away')
       end associate
     end do
+    found = 0
+    do k = 1, size(found)
+      associate (row => model%probes(k)%row)
+        if (row >= model%blocks%first .and. row <= model%blocks%last) &
+          found(k) = model%materials%material_of(row)
+      end associate
+    end do
+    call model%blocks%ranks%largest_numbers(found)
+    model%probes%material = found
   end subroutine set_up_probes
 
 end module pd_setup_probes

@@ -267,6 +267,8 @@ contains
     model%delta = delta
     model%points%position = body%position
     model%points%volume = body%volume
+    model%points%all_volume = sum(body%volume)
+    model%points%largest_volume = maxval(body%volume)
     allocate (model%points%free(body%n, 2), source=1.0_wp)
     if (present(free)) model%points%free = free
     allocate (model%points%place(body%n), model%points%in_body(body%n), source=0.0_wp)
