@@ -24,8 +24,9 @@ module pd_run
   use pd_own_files, only: keep_inputs, lock_path
   use pd_plausibility, only: look_at_model, look_at_motion
   use pd_ranks, only: ranks_t
-  use pd_record, only: load_checkpoint, observe_state, open_record, record_doubts, record_frame, &
-    record_line, record_progress, record_row, record_t
+  use pd_record, only: observe_state, open_record, record_doubts, record_frame, record_line, &
+    record_progress, record_row, record_t
+  use pd_record_checkpoint, only: load_checkpoint
   use pd_reversal, only: new_reversal, reversal_t
   use pd_run_description, only: provenance_t
   use pd_schedule, only: schedule_t

@@ -7,7 +7,8 @@ module pd_run_end
   use pd_lock, only: release_lock
   use pd_quality, only: tell_quality
   use pd_record, only: close_record, observe_state, record_failure, record_frame, record_line, &
-    record_row, save_last_checkpoint
+    record_row
+  use pd_record_checkpoint, only: save_last_checkpoint
   use pd_run, only: run_t
   use pd_text, only: coordinate_text, integer_text, short_number
   use pd_timing, only: kernel_names

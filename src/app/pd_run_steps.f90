@@ -7,8 +7,8 @@ module pd_run_steps
   use pd_errors, only: error_list_t, exit_file, exit_interrupted, exit_terminated, outcome_t
   use pd_kinds, only: wp
   use pd_progress, only: progress_due
-  use pd_record, only: observe_state, record_frame, record_line, record_progress, record_row, &
-    save_checkpoint
+  use pd_record, only: observe_state, record_frame, record_line, record_progress, record_row
+  use pd_record_checkpoint, only: save_checkpoint
   use pd_run, only: run_t
   use pd_run_end, only: fail
   use pd_system, only: pending_signal, sigint, signal_name

@@ -10,7 +10,8 @@ module pd_strength_reduction
   use pd_forces, only: forces
   use pd_kinds, only: wp
   use pd_materials, only: material_t
-  use pd_record, only: record_frame, record_line, record_tries, save_checkpoint
+  use pd_record, only: record_frame, record_line, record_tries
+  use pd_record_checkpoint, only: save_checkpoint
   use pd_relaxation, only: keep_start, relax, relaxed_t, return_to_start
   use pd_run, only: run_t
   use pd_run_end, only: fail, fastest_row

@@ -1,12 +1,10 @@
-!> What a run writes: rows, frames, checkpoints and progress, from the model and its state.
+!> What a run writes: rows, frames and progress, from the model and its state.
 !>
 !> The only module that knows both the physics and the output.
 module pd_record
   use, intrinsic :: ieee_arithmetic, only: ieee_is_nan
   use pd_agreement, only: any_rank
-  use pd_changes, only: changes_of, n_change
-  use pd_checkpoint, only: checkpoint_t, read_checkpoint, remove_checkpoints, &
-    write_checkpoint
+  use pd_checkpoint, only: checkpoint_t, remove_checkpoints
   use pd_clock, only: clock_t
   use pd_division, only: bring_looked_at
   use pd_doubt_list, only: doubts_t
@@ -17,7 +15,7 @@ module pd_record
   use pd_history, only: close_history, create_history, history_t, read_history, resume_history, &
     write_row
   use pd_history_columns, only: history_columns
-  use pd_input, only: compare_used, used_values
+  use pd_input, only: used_values
   use pd_input_types, only: input_t
   use pd_kinds, only: is_set, wp
   use pd_ledger, only: ledger_t
@@ -26,7 +24,7 @@ module pd_record
   use pd_parts_of_points, only: hand_in_points
   use pd_progress, only: close_progress, open_progress, progress_t, say, show_progress, status_t
   use pd_result, only: add_row, attend_result, create_result, finish_result, places_t, &
-    result_t, resume_result, write_failed_frame, write_frame, write_rows, write_tries
+    result_t, resume_result, write_failed_frame, write_frame, write_tries
   use pd_run_description, only: provenance_t, run_description_t
   use pd_schedule, only: schedule_t
   use pd_state, only: state_t
@@ -40,7 +38,7 @@ module pd_record
   public :: open_record, close_record, record_row, record_frame
   public :: record_failure, record_progress, record_line, observe_state
   public :: record_doubts, record_quality
-  public :: record_tries, save_checkpoint, save_last_checkpoint, load_checkpoint
+  public :: record_tries, points_of
 
   character(1), parameter :: axes(2) = ['x', 'y']
 
@@ -58,9 +56,6 @@ module pd_record
     integer :: rows_owed = 0, frames_owed = 0    !! due at this step, but could not be written
     logical :: elsewhere = .false.               !! another rank writes
   end type record_t
-
-  character(*), parameter :: ledger_names(4) = [character(24) :: 'initial_kinetic_energy', &
-    'initial_strain_energy', 'largest_work', 'outer_work']
 
 contains
 
@@ -360,115 +355,5 @@ contains
 
     if (.not. record%elsewhere) call write_quality(record%result%path, quality, errors)
   end subroutine record_quality
-
-  !> Write a checkpoint of the state after a step, but first the rows of the history before it.
-  subroutine save_checkpoint(model, state, ledger, clock, limit, record, errors)
-    type(model_t),      intent(in)    :: model
-    type(state_t),      intent(inout) :: state   !! visited, not changed
-    type(ledger_t),     intent(in)    :: ledger
-    type(clock_t),      intent(in)    :: clock
-    type(step_limit_t), intent(in)    :: limit
-    type(record_t),     intent(inout) :: record
-    type(error_list_t), intent(inout) :: errors
-    integer :: before
-
-    before = errors%count()
-    if (.not. record%elsewhere) call write_rows(record%result, errors)
-    if (any_rank(model%blocks%ranks, errors%count() > before)) return
-    call put_checkpoint(model, state, ledger, clock, limit, record, errors)
-  end subroutine save_checkpoint
-
-  !> Write a last checkpoint where a file cannot be written: a restart writes what is owed. It takes
-  !> the rows that the result file lacks from the CSV file. Nothing is written where another run
-  !> has taken the place of this one.
-  subroutine save_last_checkpoint(model, state, ledger, clock, limit, record, errors)
-    type(model_t),      intent(in)    :: model
-    type(state_t),      intent(inout) :: state   !! visited, not changed
-    type(ledger_t),     intent(in)    :: ledger
-    type(clock_t),      intent(in)    :: clock
-    type(step_limit_t), intent(in)    :: limit
-    type(record_t),     intent(inout) :: record
-    type(error_list_t), intent(inout) :: errors
-    type(error_list_t) :: known
-
-    if (.not. (record%result%is_lost .or. record%elsewhere)) call write_rows(record%result, known)
-    if (any_rank(model%blocks%ranks, record%result%is_foreign)) then
-      call errors%add('no checkpoint is written: another run writes these files')
-    else
-      call put_checkpoint(model, state, ledger, clock, limit, record, errors)
-    end if
-  end subroutine save_last_checkpoint
-
-  subroutine put_checkpoint(model, state, ledger, clock, limit, record, errors)
-    type(model_t),      intent(in)    :: model
-    type(state_t),      intent(inout) :: state   !! visited, not changed
-    type(ledger_t),     intent(in)    :: ledger
-    type(clock_t),      intent(in)    :: clock
-    type(step_limit_t), intent(in)    :: limit
-    type(record_t),     intent(inout) :: record
-    type(error_list_t), intent(inout) :: errors
-    type(checkpoint_t) :: checkpoint
-    type(ledger_t) :: whole
-
-    whole = ledger%gathered(model%blocks)
-    checkpoint%clock = clock
-    checkpoint%limit = limit
-    checkpoint%history_rows = record%history%rows
-    checkpoint%frames_written = record%frames
-    checkpoint%rows_owed = record%rows_owed
-    checkpoint%frames_owed = record%frames_owed
-    checkpoint%ledger_names = ledger_names
-    checkpoint%ledger = [ledger%initial_kinetic_energy, ledger%initial_strain_energy, &
-      ledger%largest_work, ledger%outer_work]
-    allocate (checkpoint%ledger_blocks(size(whole%plastic), 4))
-    checkpoint%ledger_blocks(:, 1) = whole%plastic
-    checkpoint%ledger_blocks(:, 2) = whole%damping
-    checkpoint%ledger_blocks(:, 3) = whole%frame_work
-    checkpoint%ledger_blocks(:, 4) = whole%control
-    checkpoint%input = record%values
-    allocate (checkpoint%changes(n_change, max(1, size(model%supports%items))), source=-1.0_wp)
-    checkpoint%changes(:, :size(model%supports%items)) = changes_of(model%supports)
-    if (model%blocks%ranks%count > 1 .and. model%whole%n == 0) then
-      checkpoint%boundary = model%body%boundary
-      call write_checkpoint(record%stem, checkpoint, state, model%shown%row, errors, model%blocks, &
-        model%points)
-    else
-      call points_of(model, checkpoint%position, checkpoint%volume, checkpoint%boundary)
-      call write_checkpoint(record%stem, checkpoint, state, model%shown%row, errors, model%blocks)
-    end if
-  end subroutine put_checkpoint
-
-  !> Read the newest checkpoint and compare its input with the present one. The state has one row
-  !> per point.
-  !>
-  !> Errors, `file_errors`: no checkpoint that can be read; `input_errors`: values that differ.
-  subroutine load_checkpoint(input, checkpoint, state, ledger, warning, file_errors, input_errors)
-    type(input_t),      intent(in)    :: input
-    type(checkpoint_t), intent(out)   :: checkpoint
-    type(state_t),      intent(out)   :: state
-    type(ledger_t),     intent(out)   :: ledger
-    character(:), allocatable, intent(out) :: warning
-    type(error_list_t), intent(inout) :: file_errors, input_errors
-
-    state%in_stages = size(input%stages) > 0
-    state%has_initial_strain = is_set(input%initial_stress%k0) .or. state%in_stages
-    call read_checkpoint(input%run%output_dir//'/'//input%run%name, checkpoint, state, warning, &
-      file_errors)
-    if (file_errors%count() > 0) return
-    if (size(checkpoint%ledger) /= size(ledger_names) &
-      .or. size(checkpoint%ledger_blocks, 2) /= 4) then
-      call file_errors%add('the checkpoint was written by another version of perigeo')
-      return
-    end if
-    ledger%initial_kinetic_energy = checkpoint%ledger(1)
-    ledger%initial_strain_energy = checkpoint%ledger(2)
-    ledger%largest_work = checkpoint%ledger(3)
-    ledger%outer_work = checkpoint%ledger(4)
-    ledger%plastic = checkpoint%ledger_blocks(:, 1)
-    ledger%damping = checkpoint%ledger_blocks(:, 2)
-    ledger%frame_work = checkpoint%ledger_blocks(:, 3)
-    ledger%control = checkpoint%ledger_blocks(:, 4)
-    call compare_used(checkpoint%input, used_values(input), input_errors)
-  end subroutine load_checkpoint
 
 end module pd_record
