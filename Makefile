@@ -60,7 +60,7 @@ studies := fig3a fig3b fig4 fig5 seeds horizon loading size softening influence 
 .PHONY: all program objects post debug units demo demo-quick test lint verify \
   layers setup install help clean distclean figures $(studies) \
   report report-view site bench clouds finite_elements limit_loads \
-  fuzz soak sanitize compilers
+  fuzz soak sanitize
 .DEFAULT_GOAL := all
 
 help_width := 13
@@ -172,10 +172,6 @@ sanitize:          ## sanitizers, valgrind, races; PARTS='address races valgrind
 	@MAKE_COMMAND='$(MAKE)' $(venv)/bin/python tests/proof/sanitize/sanitize.py $(PARTS) \
 	  --suites '$(SUITES)'
 
-compilers:         ## build with every gfortran and flang that is there, and say what each can do
-	@sh tools/setup.sh run
-	@sh tests/proof/compilers.sh '$(MAKE)'
-
 bench:             ## measure the speed on this machine; PUBLISH=1: into doc/performance.md
 	@sh tools/setup.sh test
 	@$(submake) $(parallel) program build/opt/bench/machine
@@ -209,7 +205,7 @@ help:              ## list the targets
 # The rest needs the compiler and HDF5, which `make demo` may have to install first.
 ifneq ($(filter-out setup demo demo-quick test debug lint verify layers help clean \
   distclean figures $(studies) report report-view site bench clouds finite_elements limit_loads \
-  fuzz soak sanitize compilers,\
+  fuzz soak sanitize,\
   $(or $(MAKECMDGOALS),all)),)
 
 ifeq ($(shell command -v $(firstword $(FC)) 2>/dev/null),)

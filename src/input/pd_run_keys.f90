@@ -94,8 +94,8 @@ contains
         .and. self%frame_count == 0) self%frame_count = frames_by_default
   end subroutine complete_output
 
-  !> Whether a checkpoint is due for the clock's sake. Who asks for some gets one of the last step as
-  !> well; of a run that says nothing one is kept too, so seldom that it costs nothing.
+  !> Whether a checkpoint is due for the clock's sake. Who asks for some gets one of the last step
+  !> as well; of a run that says nothing one is kept too, so seldom that it costs nothing.
   pure logical function checkpoint_due(self, seconds, last) result(due)
     class(output_input_t), intent(in) :: self
     real(wp), intent(in) :: seconds   !! since the last checkpoint, or since the run began
