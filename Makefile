@@ -69,8 +69,7 @@ studies := fig3a fig3b fig4 fig5 seeds horizon loading size softening influence 
 # Targets that need no compiler, or see to it themselves.
 sets_up := setup uninstall wheel demo demo-quick test debug lint verify layers help clean \
   distclean figures $(studies) report report-view gallery site site-view bench clouds \
-  finite_elements limit_loads mutants fuzz soak sanitize compilers \
-  test_ranks scaling
+  finite_elements limit_loads mutants fuzz soak sanitize test_ranks scaling
 .PHONY: all program objects post units install $(sets_up)
 .DEFAULT_GOAL := all
 
@@ -197,10 +196,6 @@ sanitize:          ## sanitizers, valgrind, races; PARTS='address races valgrind
 	@$(submake) BUILD=debug $(parallel) program
 	@MAKE_COMMAND='$(MAKE)' $(venv)/bin/python tests/proof/sanitize/sanitize.py $(PARTS) \
 	  --suites '$(SUITES)'
-
-compilers:         ## build with every gfortran and flang that is there, and say what each can do
-	@sh tools/setup.sh run
-	@sh tests/proof/compilers.sh '$(MAKE)'
 
 bench:             ## measure the speed on this machine; PUBLISH=1: into doc/performance.md
 	@sh tools/setup.sh test

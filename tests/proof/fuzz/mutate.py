@@ -19,9 +19,9 @@ FACTORS = (
 )  # fmt: skip
 LETTERS = (
     b"\xe4", "ä".encode(), "\u00a0".encode(), "\u201c".encode(), "\u2019".encode(),
-    "\u2212".encode(), b"\x00", b"\x1b", b"\x7f", b"\xff", b"\xef\xbb\xbf", b"'", b'"', b"/",
-    b"&", b"!", b"=", b",", b"*", b"(", b")", b"%", b"#", b";", b"\t", b"\r", b"\n", b"\r\n",
-    b"\\", b"&end\n", b"/\n&", b" / ", "𝛿".encode(), b"''", b"$",
+    "\u2212".encode(), b"\x00", b"\x1b", b"\x7f", b"\xff", b"\xef\xbb\xbf", b"'", b'"', b"/", b"&",
+    b"!", b"=", b",", b"*", b"(", b")", b"%", b"#", b";", b"\t", b"\r", b"\n", b"\r\n", b"\\",
+    b"&end\n", b"/\n&", b" / ", "𝛿".encode(), b"''", b"$",
 )  # fmt: skip
 
 
