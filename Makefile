@@ -191,11 +191,10 @@ soak:              ## random kills, damaged checkpoints, full disks; MINUTES=20 
 	@$(venv)/bin/python tests/proof/soak/soak.py --minutes $(or $(MINUTES),20) \
 	  $(if $(KILLS),--kills $(KILLS)) --seed $(or $(SEED),1)
 
-sanitize:          ## sanitizers, valgrind, races; PARTS='address races valgrind', SUITES=text
+sanitize:          ## races, two of them planted, and memory by valgrind; PARTS='races valgrind'
 	@sh tools/setup.sh test
 	@$(submake) BUILD=debug $(parallel) program
-	@MAKE_COMMAND='$(MAKE)' $(venv)/bin/python tests/proof/sanitize/sanitize.py $(PARTS) \
-	  --suites '$(SUITES)'
+	@MAKE_COMMAND='$(MAKE)' $(venv)/bin/python tests/proof/sanitize/sanitize.py $(PARTS)
 
 bench:             ## measure the speed on this machine; PUBLISH=1: into doc/performance.md
 	@sh tools/setup.sh test

@@ -1,8 +1,7 @@
-"""Memory, undefined behaviour and races: the program and its unit suites under checkers.
+"""Races and memory: the program under checkers.
 
-    .venv/bin/python tests/proof/sanitize/sanitize.py [address] [races] [valgrind] [--suites TEXT]
+    .venv/bin/python tests/proof/sanitize/sanitize.py [races] [valgrind]
 
-address   sanitizers of addresses and undefined behaviour over the unit suites and tiny runs
 races     ThreadSanitizer with an OpenMP that it understands; races planted on purpose are found
 valgrind  a tiny run of the checking build
 
@@ -11,7 +10,6 @@ valgrind  a tiny run of the checking build
 
 import argparse
 import os
-import re
 import shutil
 import subprocess
 import sys
@@ -19,10 +17,6 @@ import tempfile
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[3]
-sys.path.insert(0, str(ROOT / "tests" / "support"))
-
-from run_tests import TEST_NAME, run_own  # noqa: E402
-
 HERE = Path(__file__).resolve().parent
 TWO_BLOCKS = 0.05  # spacing of bodies with several blocks of 256 rows
 BODY = """\
@@ -118,64 +112,10 @@ def run(words, text, environment, limit=600):
     return done.returncode, done.stdout + done.stderr
 
 
-def restarted(program, text, environment):
-    """Run, stop and go on; return the exit statuses and what was said."""
-    statuses, said = [], ""
-    with tempfile.TemporaryDirectory(prefix="perigeo-sanitize-") as folder:
-        (Path(folder) / "run.nml").write_text(text)
-        for options in ([], ["--restart", "--set", "integration.end_time=0.04"]):
-            done = subprocess.run(
-                [program, *options, "run.nml"], cwd=folder, check=False, capture_output=True,
-                text=True, errors="replace", env={**os.environ, **environment},
-            )  # fmt: skip
-            statuses.append(done.returncode)
-            said += done.stdout + done.stderr
-    return statuses, said
-
-
 # ------------------------------------------------------------------------------------ parts
 
 
-def address(count, suites):
-    """Sanitizers of addresses and undefined behaviour."""
-    flags = (
-        "-O1 -g -fno-omit-frame-pointer -fsanitize=address,undefined "
-        "-fno-sanitize-recover=undefined"
-    )
-    names = [path for path in sorted((ROOT / "tests" / "unit").glob("*/test_*.pf"))
-             if path.stem != "test_pd_memory" and re.search(suites, path.stem)]  # fmt: skip
-    goals = [f"build/sanitize-address/unit/{path.stem}" for path in names]
-    built = make("sanitize-address", flags, "program", *goals)
-    count.note("build with the sanitizers of addresses and undefined behaviour", built)
-    if not built:
-        return
-    # what libraries keep until the end is no leak of ours
-    os.environ["ASAN_OPTIONS"] = "detect_leaks=0:detect_stack_use_after_return=1"
-    os.environ["UBSAN_OPTIONS"] = "print_stacktrace=1"
-    folder = ROOT / "build" / "sanitize-address"
-    for path in names:
-        scratch = folder / f"{path.stem}.run"
-        shutil.rmtree(scratch, ignore_errors=True)
-        scratch.mkdir()
-        passed, failures = run_own(folder / "unit" / path.stem, TEST_NAME.findall(path.read_text()),
-                                   scratch)  # fmt: skip
-        said = "\n".join(f"{f.test} {f.place} " + "\n".join(f.notes) for f in failures)
-        count.note(f"{path.stem}, {passed} tests", not failures and passed > 0, said)
-    program = folder / "perigeo"
-    for name, text in TINY.items():
-        status, said = run([program, "--threads", "2"], text, {})
-        count.note(f"run: {name}", status == 0 and not complains(said), said)
-    statuses, said = restarted(program, TINY["lattice"], {})
-    count.note("run and restart", statuses == [0, 0] and not complains(said), said)
-    status, said = run([program, "--check"], TINY["lattice"].replace("'j2'", "'j3'"), {})
-    count.note("a wrong input", status == 2 and not complains(said), said)
-
-
-def complains(said):
-    return "Sanitizer" in said or "runtime error" in said
-
-
-def races(count, _):
+def races(count):
     """ThreadSanitizer, with regions that start and join threads."""
     flags = "-O1 -g -fsanitize=thread"
     folder = ROOT / "build" / "sanitize-races"
@@ -243,7 +183,7 @@ def plant_in(plant, folder, flags, shim):
     return planted
 
 
-def valgrind(count, _):
+def valgrind(count):
     """Memory of a tiny run, every load and store."""
     if shutil.which("valgrind") is None:
         count.note("valgrind is not there: apt-get install valgrind", False)
@@ -256,17 +196,16 @@ def valgrind(count, _):
         count.note(f"valgrind: {name}", status == 0 and "== " not in said, said)
 
 
-PARTS = {"address": address, "races": races, "valgrind": valgrind}
+PARTS = {"races": races, "valgrind": valgrind}
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("parts", nargs="*", choices=[*PARTS, []], default=[])
-    parser.add_argument("--suites", default="", help="only suites whose name has this in it")
     options = parser.parse_args()
     count = Count()
     for part in options.parts or PARTS:
-        PARTS[part](count, options.suites)
+        PARTS[part](count)
     print(f"{count.passed} passed, {count.failed} failed")
     return 1 if count.failed or not count.passed else 0
 
