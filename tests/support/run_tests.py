@@ -14,12 +14,14 @@ import subprocess
 import sys
 import time
 import xml.etree.ElementTree as ElementTree
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 SUITE_LIMIT = 600.0  # seconds for one unit test program; it counts as hanging after that
-PYTEST_SUITES = ("postproc/tests", "tests/cases")
+# Folders of pytest, in how many parts each is run; parts run side by side where there are cores.
+PYTEST_SUITES = {"tests/cases": 2, "postproc/tests": 1}
 TEST_NAME = re.compile(r"^\s*@test\s*\n(?:\s*(?:!.*)?\n)*\s*subroutine\s+(\w+)", re.I | re.M)
 
 
@@ -243,18 +245,32 @@ def run_units(command, build, with_pfunit, unbuilt):
 # ------------------------------------------------------------------------------- pytest
 
 
-def run_pytest(path, build, report):
-    """Run one folder with pytest and count from its report."""
-    if not list((ROOT / path).glob("**/test_*.py")):
-        say(f"{path}: no tests")
+def parts_of(path, count):
+    """Return the test files of a folder in parts that take about as long."""
+    files = sorted((ROOT / path).glob("**/test_*.py"))
+    return [[str(file.relative_to(ROOT)) for file in files[k::count]] for k in range(count)]
+
+
+def run_pytest(files, name, build):
+    """Run test files with pytest, what they say into a file of that name; count from the report."""
+    if not files:
         return Count(failed=1)
     program = ROOT / "bin" / ("perigeo-debug" if build == "debug" else "perigeo")
     environment = dict(os.environ, PERIGEO_BIN=str(program), PERIGEO_ROOT=str(ROOT))
     environment.setdefault("MPLBACKEND", "Agg")
+    report = name.with_suffix(".xml")
     report.unlink(missing_ok=True)
     report.parent.mkdir(parents=True, exist_ok=True)
-    words = [sys.executable, "-m", "pytest", "-q", "--color=no", path, f"--junitxml={report}"]
-    status = subprocess.run(words, cwd=ROOT, env=environment, check=False).returncode
+    words = [sys.executable, "-m", "pytest", "-q", "--color=no", *files, f"--junitxml={report}"]
+    with name.open("w") as output:
+        status = subprocess.run(
+            words,
+            cwd=ROOT,
+            env=environment,
+            check=False,
+            stdout=output,
+            stderr=subprocess.STDOUT,
+        ).returncode
     if not report.exists():
         return Count(failed=1)
     suite = next(ElementTree.parse(report).getroot().iter("testsuite"))
@@ -265,6 +281,24 @@ def run_pytest(path, build, report):
     if status != 0 and bad == 0:
         bad, total = 1, total + 1
     return Count(total - bad - skipped, bad, skipped)
+
+
+def run_suites(build):
+    """Run all folders of pytest, as many parts at a time as there are cores; return the counts."""
+    folder = ROOT / "build" / build
+    counts = {path: Count() for path in PYTEST_SUITES}
+    say(f"\n{' and '.join(PYTEST_SUITES)}, side by side: some minutes")
+    with ThreadPoolExecutor(max_workers=os.cpu_count() or 1) as pool:
+        running = []
+        for path, count in PYTEST_SUITES.items():
+            for k, files in enumerate(parts_of(path, count)):
+                name = folder / f"{path.replace('/', '-')}-{k + 1}.log"
+                running.append((path, name, pool.submit(run_pytest, files, name, build)))
+        for path, name, part in running:
+            counts[path].add(part.result())
+            say(f"\nTests of {path}")
+            say(name.read_text(errors="replace").rstrip() if name.exists() else "no tests")
+    return counts
 
 
 # ------------------------------------------------------------------------------- all
@@ -287,10 +321,7 @@ def main():
 
     say(f"\nUnit tests ({'pFUnit' if with_pfunit else 'the small runner'})")
     parts["tests/unit"] = run_units(options.make, options.build, with_pfunit, unbuilt)
-    for path in PYTEST_SUITES:
-        say(f"\nTests of {path}")
-        report = ROOT / "build" / options.build / f"{path.replace('/', '-')}.xml"
-        parts[path] = run_pytest(path, options.build, report)
+    parts.update(run_suites(options.build))
 
     say()
     total = Count()
