@@ -21,7 +21,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 SUITE_LIMIT = 600.0  # seconds for one unit test program; it counts as hanging after that
 # Folders of pytest, in how many parts each is run; parts run side by side where there are cores.
-PYTEST_SUITES = {"tests/cases": 2, "postproc/tests": 1}
+PYTEST_SUITES = {"tests/cases": 2, "postproc/tests": 2}
 TEST_NAME = re.compile(r"^\s*@test\s*\n(?:\s*(?:!.*)?\n)*\s*subroutine\s+(\w+)", re.I | re.M)
 
 
