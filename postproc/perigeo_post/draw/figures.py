@@ -117,15 +117,14 @@ def _mark(ax: Axes, curve: Curve, marks: Sequence[float]) -> None:
         float(np.nanmax(np.abs(curve.y))) if np.isfinite(curve.y).any() else 0.0, curve.y_unit
     )
     if marks:
-        ax.margins(x=0.1)
+        ax.margins(x=0.16)  # room for the words of a mark at the end
     for strain in marks:
         x = curve.toward(strain)
         y = curve.at(x) * factor
         ax.plot([100.0 * x], [y], "o", color="black", zorder=5)
-        at_end = abs(x - curve.x[0]) > 0.9 * float(np.ptp(curve.x))
         ax.annotate(
-            f"{100.0 * strain:g} %", (100.0 * x, y), xytext=(0, 4) if at_end else (3, 3),
-            textcoords="offset points", fontsize=7, ha="center" if at_end else "left",
+            f"{100.0 * strain:g} %", (100.0 * x, y), xytext=(3, 3),
+            textcoords="offset points", fontsize=7,
         )  # fmt: skip
 
 
