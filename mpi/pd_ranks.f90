@@ -8,14 +8,14 @@ module pd_ranks
   use, intrinsic :: iso_fortran_env, only: error_unit, output_unit
   use mpi_f08, only: mpi_abort, mpi_allgatherv, mpi_allreduce, mpi_bcast, mpi_bor, &
     mpi_comm_rank, mpi_comm_size, mpi_comm_world, mpi_double_precision, mpi_finalize, &
-    mpi_in_place, mpi_init_thread, mpi_integer, mpi_integer8, mpi_irecv, mpi_isend, &
-    mpi_max, mpi_min, mpi_recv, mpi_request, mpi_send, mpi_status_ignore, mpi_statuses_ignore, &
-    mpi_thread_funneled, mpi_waitall
+    mpi_iallreduce, mpi_in_place, mpi_init_thread, mpi_integer, mpi_integer8, mpi_irecv, &
+    mpi_isend, mpi_max, mpi_min, mpi_recv, mpi_request, mpi_send, mpi_status_ignore, &
+    mpi_statuses_ignore, mpi_testall, mpi_thread_funneled, mpi_waitall
   use pd_kinds, only: wp
   implicit none
   private
 
-  public :: ranks_t, begin_ranks, end_ranks, abort_ranks
+  public :: ranks_t, messages_t, begin_ranks, end_ranks, abort_ranks
 
   !> The ranks of a run, numbered from 0. The blocks of a body are divided among them where `before`
   !> is allocated; until then every rank has all of them.
@@ -32,11 +32,21 @@ module pd_ranks
     procedure :: gathered
     procedure :: gathered_rows
     procedure :: largest_numbers
+    procedure :: begin_largest
     procedure :: fill_in
-    procedure :: swap
+    procedure :: begin_swap
     procedure :: spread_out
     procedure :: hand_over
   end type ranks_t
+
+  !> Messages on their way. What is sent and received must stay where it is until they have arrived.
+  type :: messages_t
+    type(mpi_request), allocatable, private :: requests(:)
+  contains
+    procedure :: help
+    procedure, private :: await_values, await_numbers
+    generic   :: await => await_values, await_numbers
+  end type messages_t
 
   integer, parameter :: any_tag = 0
 
@@ -167,6 +177,19 @@ contains
       mpi_max, mpi_comm_world)
   end subroutine largest_numbers
 
+  !> Begin to find them.
+  subroutine begin_largest(self, numbers, messages)
+    class(ranks_t),   intent(in)    :: self
+    integer,          intent(inout), contiguous, asynchronous :: numbers(:)
+    type(messages_t), intent(out)   :: messages
+    type(mpi_request) :: request
+
+    if (self%count == 1) return
+    call mpi_iallreduce(mpi_in_place, numbers, size(numbers), mpi_integer, mpi_max, &
+      mpi_comm_world, request)
+    messages%requests = [request]
+  end subroutine begin_largest
+
   !> Numbers of which each is known to one rank, made known to all, bit by bit.
   subroutine fill_in(self, numbers)
     class(ranks_t), intent(in) :: self
@@ -176,14 +199,15 @@ contains
       mpi_integer8, mpi_bor, mpi_comm_world)
   end subroutine fill_in
 
-  !> Send numbers to some ranks and receive others from them.
-  subroutine swap(self, partners, sent_ends, sent, received_ends, received)
+  !> Begin to send numbers to some ranks and to receive others from them.
+  subroutine begin_swap(self, partners, sent_ends, sent, received_ends, received, messages)
     class(ranks_t), intent(in) :: self
     integer,  intent(in) :: partners(:)                  !! ranks
     integer,  intent(in) :: sent_ends(0:)                !! last number for each; 0 before the first
     integer,  intent(in) :: received_ends(0:)            !! likewise
     real(wp), intent(in),    contiguous, asynchronous :: sent(:)
     real(wp), intent(inout), contiguous, asynchronous :: received(:)
+    type(messages_t), intent(out) :: messages
     type(mpi_request) :: requests(2 * size(partners))
     integer :: k, n
 
@@ -204,8 +228,44 @@ contains
           mpi_double_precision, partners(k), any_tag, mpi_comm_world, requests(n))
       end if
     end do
-    call mpi_waitall(n, requests(:n), mpi_statuses_ignore)
-  end subroutine swap
+    messages%requests = requests(:n)
+  end subroutine begin_swap
+
+  !> Help messages on: large ones travel only while their ranks look at them.
+  subroutine help(self)
+    class(messages_t), intent(inout) :: self
+    logical :: arrived
+
+    if (.not. allocated(self%requests)) return
+    call mpi_testall(size(self%requests), self%requests, arrived, mpi_statuses_ignore)
+  end subroutine help
+
+  !> Wait until messages have arrived.
+  subroutine await_values(self, received)
+    class(messages_t), intent(inout) :: self
+    real(wp), intent(inout), contiguous, asynchronous :: received(:)   !! as they began
+
+    associate (unchanged => received)
+    end associate
+    call wait_for(self)
+  end subroutine await_values
+
+  !> The same for whole numbers.
+  subroutine await_numbers(self, received)
+    class(messages_t), intent(inout) :: self
+    integer, intent(inout), contiguous, asynchronous :: received(:)   !! as they began
+
+    associate (unchanged => received)
+    end associate
+    call wait_for(self)
+  end subroutine await_numbers
+
+  subroutine wait_for(self)
+    class(messages_t), intent(inout) :: self
+
+    if (.not. allocated(self%requests)) return
+    call mpi_waitall(size(self%requests), self%requests, mpi_statuses_ignore)
+  end subroutine wait_for
 
   !> What one rank has, made known to rank 0.
   subroutine hand_over(self, from, values)

@@ -70,6 +70,7 @@ module pd_run
     character(:), allocatable :: mark         !! of its file
     logical :: whole = .false.                !! files are open, and the state is one to go on from
     type(error_list_t) :: trouble             !! with files, in a step whose state is not whole
+    logical :: heard = .false.                !! there have been news
     type(doubts_t)     :: doubts
     logical :: jump_told = .false.            !! at equilibrium
     real(wp) :: largest_reaction = 0.0_wp     !! of a platen so far [N/m]

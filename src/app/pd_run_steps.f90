@@ -11,6 +11,7 @@ module pd_run_steps
   use pd_record_checkpoint, only: save_checkpoint
   use pd_run, only: run_t
   use pd_run_end, only: fail
+  use pd_state, only: n_news
   use pd_system, only: pending_signal, sigint, signal_name
   use pd_timing, only: kernel_history
   implicit none
@@ -30,25 +31,24 @@ module pd_run_steps
 
 contains
 
-  !> What is due after a step. A signal that comes during a step takes effect after the next one.
-  !> Clocks, signals and trouble with files differ from rank to rank: what one of them finds due is
-  !> due.
+  !> What is due after a step. Clocks, signals and trouble with files differ from rank to rank: what
+  !> one of them finds due is due. In a motion they tell each other what they find before a step
+  !> while that goes on, and it takes effect after the next one; at once in the first and the last
+  !> step, and at equilibrium, where steps are long.
   type(due_t) function due_after_step(step, run) result(due)
-    integer,     intent(in) :: step
-    type(run_t), intent(in) :: run
-    integer(int64) :: now, rate
-    integer :: found(4)
+    integer,     intent(in)    :: step
+    type(run_t), intent(inout) :: run
+    integer :: found(n_news)
 
     due%row = run%schedule%row_due(step)
     due%frame = run%schedule%frames_due(step) > 0
-    if (.not. run%record%elsewhere) &
-      due%progress = progress_due(run%record%progress, step, run%schedule%steps)
-    call system_clock(now, rate)
-    due%checkpoint = run%input%output%checkpoint_due(real(now - run%last_checkpoint, wp) &
-      / real(rate, wp), last=step == run%schedule%steps)
-    found = [pending_signal(), merge(1, 0, due%checkpoint), merge(1, 0, due%progress), &
-      merge(1, 0, run%trouble%count() > 0)]
-    call run%ranks%largest_numbers(found)
+    found = run%work%news
+    if (run%model%at_equilibrium .or. .not. run%heard .or. step == run%schedule%steps) then
+      found = found_before(step, run)
+      call run%ranks%largest_numbers(found)
+    end if
+    run%work%news = found_before(step + 1, run)
+    run%heard = .true.
     due%signal = found(1)
     due%stop = due%signal /= 0 .or. found(4) > 0
     due%checkpoint = due%stop .or. found(2) > 0
@@ -56,6 +56,22 @@ contains
     due%anything = due%row .or. due%frame .or. due%checkpoint
     due%whole = due%anything .or. run%limit%look_due(step) .or. run%model%at_equilibrium
   end function due_after_step
+
+  !> What this rank finds: a signal, a checkpoint and a line of progress that are due after a step,
+  !> and trouble with files.
+  function found_before(step, run) result(found)
+    integer,     intent(in) :: step
+    type(run_t), intent(in) :: run
+    integer :: found(n_news)
+    integer(int64) :: now, rate
+
+    call system_clock(now, rate)
+    found = [pending_signal(), merge(1, 0, run%input%output%checkpoint_due( &
+      real(now - run%last_checkpoint, wp) / real(rate, wp), last=step == run%schedule%steps)), &
+      0, merge(1, 0, run%trouble%count() > 0)]
+    if (.not. run%record%elsewhere) &
+      found(3) = merge(1, 0, progress_due(run%record%progress, step, run%schedule%steps))
+  end function found_before
 
   !> Write what is due, but check the state first: a run that gains energy has failed.
   !>
@@ -83,7 +99,7 @@ contains
       call record_progress(run%model, run%state, run%schedule, run%clock, run%record, errors)
     call run%timing%lap(kernel_history)
     call write_frames_and_checkpoint(due, run, errors)
-    if (run%trouble%count() > 0) errors = run%trouble
+    if (due%stop .and. run%trouble%count() > 0) errors = run%trouble
     if (due%stop .and. errors%count() == 0) call record_line(run%record, &
       'stopped by a signal ('//signal_name(due%signal)// &
       '); --restart goes on from the checkpoint', errors)

@@ -7,7 +7,7 @@ module pd_ranks
   implicit none
   private
 
-  public :: ranks_t, begin_ranks, end_ranks, abort_ranks
+  public :: ranks_t, messages_t, begin_ranks, end_ranks, abort_ranks
 
   !> The ranks of a run, numbered from 0. The blocks of a body are divided among them where `before`
   !> is allocated; until then every rank has all of them.
@@ -23,12 +23,21 @@ module pd_ranks
     procedure, nopass :: lowest_number
     procedure, nopass :: gathered
     procedure, nopass :: largest_numbers
+    procedure, nopass :: begin_largest
     procedure, nopass :: fill_in
-    procedure, nopass :: swap
+    procedure, nopass :: begin_swap
     procedure, nopass :: spread_out
     procedure, nopass :: hand_over
     procedure, nopass :: gathered_rows
   end type ranks_t
+
+  !> Messages on their way. What is sent and received must stay where it is until they have arrived.
+  type :: messages_t
+  contains
+    procedure, nopass :: help
+    procedure, nopass, private :: await_values, await_numbers
+    generic :: await => await_values, await_numbers
+  end type messages_t
 
 contains
 
@@ -112,6 +121,15 @@ contains
     end associate
   end subroutine largest_numbers
 
+  !> Begin to find them.
+  pure subroutine begin_largest(numbers, messages)
+    integer,          intent(inout), contiguous :: numbers(:)
+    type(messages_t), intent(inout) :: messages
+
+    associate (unchanged => numbers, no_messages => messages)
+    end associate
+  end subroutine begin_largest
+
   !> Numbers of which each is known to one rank, made known to all, bit by bit.
   pure subroutine fill_in(numbers)
     real(wp), intent(inout), contiguous :: numbers(:)   !! in: 0 but for those that are known here
@@ -120,18 +138,39 @@ contains
     end associate
   end subroutine fill_in
 
-  !> Send numbers to some ranks and receive others from them.
-  pure subroutine swap(partners, sent_ends, sent, received_ends, received)
+  !> Begin to send numbers to some ranks and to receive others from them.
+  pure subroutine begin_swap(partners, sent_ends, sent, received_ends, received, messages)
     integer,  intent(in)    :: partners(:)               !! ranks
     integer,  intent(in)    :: sent_ends(0:)             !! last number for each; 0 before the first
     integer,  intent(in)    :: received_ends(0:)         !! likewise
     real(wp), intent(in),    contiguous :: sent(:)
     real(wp), intent(inout), contiguous :: received(:)
+    type(messages_t), intent(inout)     :: messages
 
     associate (unused => partners, unused_ends => sent_ends, unused_others => received_ends, &
-      unused_numbers => sent, unchanged => received)
+      unused_numbers => sent, unchanged => received, no_messages => messages)
     end associate
-  end subroutine swap
+  end subroutine begin_swap
+
+  !> Help messages on.
+  pure subroutine help()
+  end subroutine help
+
+  !> Wait until messages have arrived.
+  pure subroutine await_values(received)
+    real(wp), intent(inout), contiguous :: received(:)
+
+    associate (unchanged => received)
+    end associate
+  end subroutine await_values
+
+  !> The same for whole numbers.
+  pure subroutine await_numbers(received)
+    integer, intent(inout), contiguous :: received(:)
+
+    associate (unchanged => received)
+    end associate
+  end subroutine await_numbers
 
   !> What one rank has, made known to rank 0.
   pure subroutine hand_over(from, values)

@@ -6,7 +6,7 @@
 module pd_affine_support
   use pd_kinds, only: ordered_sum, wp
   use pd_point_sets, only: point_set_t
-  use pd_supports, only: reaction, support_t
+  use pd_supports, only: n_sums, support_t
   use pd_tables, only: table_t
   implicit none
   private
@@ -22,6 +22,7 @@ module pd_affine_support
   contains
     procedure :: mark_prescribed
     procedure :: prescribe
+    procedure :: add_up
     procedure :: take_reactions
     procedure :: work
   end type affine_support_t
@@ -38,8 +39,7 @@ contains
     real(wp),          intent(in) :: mass(:)             !! rho V of all points (n) [kg/m]
     integer :: k
 
-    support%name = set%name
-    allocate (support%points(size(set%points)), source=set%points)
+    call support%hold(set)
     support%factor = factor
     allocate (support%mode(2, size(set%points)))
     do k = 1, size(set%points)
@@ -67,24 +67,38 @@ contains
 
     a = self%factor%integral(t)
     rate = self%factor%rate(t)
-    do k = 1, size(self%points)
+    if (size(self%points) == 0) return
+    u(self%points(1), :) = a * self%mode(:, 1)
+    v(self%points(1), :) = rate * self%mode(:, 1)
+    do k = self%near(1), self%near(2)
       u(self%points(k), :) = a * self%mode(:, k)
       v(self%points(k), :) = rate * self%mode(:, k)
     end do
   end subroutine prescribe
 
-  !> - sum V f, and - sum V f . L X.
-  pure subroutine take_reactions(self, volume, t, f)
-    class(affine_support_t), intent(inout) :: self
-    real(wp),                intent(in)    :: volume(:), t, f(:, :)
+  !> V f, and V f . L X.
+  pure function add_up(self, first, last, volume, f) result(sums)
+    class(affine_support_t), intent(in) :: self
+    integer,                 intent(in) :: first, last
+    real(wp),                intent(in) :: volume(:), f(:, :)
+    real(wp) :: sums(n_sums)   !! x, y [N/m], with the mode [W/m]
 
-    associate (unused => t)
+    associate (p => self%points(first:last), m => self%mode(:, first:last))
+      sums = [ordered_sum(volume(p) * f(p, 1)), ordered_sum(volume(p) * f(p, 2)), &
+        ordered_sum(volume(p) * (f(p, 1) * m(1, :) + f(p, 2) * m(2, :)))]
+    end associate
+  end function add_up
+
+  !> - sum V f, and - sum V f . L X.
+  pure subroutine take_reactions(self, sums, t, f)
+    class(affine_support_t), intent(inout) :: self
+    real(wp),                intent(in)    :: sums(n_sums), t, f(:, :)
+
+    associate (unused => t, unused_f => f)
     end associate
     self%mode_force_before = self%mode_force
-    self%force = reaction(self%points, volume, f)
-    associate (p => self%points, m => self%mode)
-      self%mode_force = -ordered_sum(volume(p) * (f(p, 1) * m(1, :) + f(p, 2) * m(2, :)))
-    end associate
+    self%force = -sums(:2)
+    self%mode_force = -sums(3)
   end subroutine take_reactions
 
   pure real(wp) function work(self, v, t, t_next)

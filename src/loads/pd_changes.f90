@@ -44,6 +44,7 @@ contains
       if (.not. allocated(platen%next)) return
       moved = platen%next
       moved%force = platen%force
+      moved%near = platen%near
     class default
       return
     end select

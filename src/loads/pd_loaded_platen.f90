@@ -8,10 +8,10 @@
 !> of its points.
 !> Source: doc/theory.md, section 7.
 module pd_loaded_platen
-  use pd_kinds, only: ordered_sum, wp
+  use pd_kinds, only: wp
   use pd_point_sets, only: point_set_t
   use pd_rigid_support, only: rigid_support_t
-  use pd_supports, only: reaction, support_t
+  use pd_supports, only: n_sums, support_t
   use pd_tables, only: new_ramp, table_t
   use pd_text, only: short_number
   implicit none
@@ -51,9 +51,8 @@ contains
     real(wp),          intent(in) :: ramp_time           !! full load from then on [s]
     real(wp), optional, intent(in) :: start              !! of the ramp; absent: 0 [s]
 
-    platen%name = set%name
+    call platen%hold(set)
     platen%load_kind = 'traction'
-    allocate (platen%points(size(set%points)), source=set%points)
     platen%as_one = as_one
     platen%traction = traction
     platen%full = merge(traction * length, 0.0_wp, as_one)
@@ -80,35 +79,30 @@ contains
     end associate
   end subroutine prescribe
 
-  pure subroutine share_forces(self, volume, t, f)
+  !> f <- (sum V f + r F) / sum V at its points.
+  pure subroutine share_forces(self, sums, t, f)
     class(loaded_platen_t), intent(in)    :: self
-    real(wp),               intent(in)    :: volume(:), t
+    real(wp),               intent(in)    :: sums(n_sums), t
     real(wp),               intent(inout) :: f(:, :)
     integer :: c
 
-    do c = 1, 2
-      if (self%as_one(c)) call share(self%points, self%factor%rate(t) * self%full(c), volume, &
-        f(:, c))
-    end do
+    associate (points => self%points(self%near(1):self%near(2)), first => self%points(1))
+      do c = 1, 2
+        if (.not. self%as_one(c)) cycle
+        f(first, c) = (self%factor%rate(t) * self%full(c) + sums(c)) / sums(3)
+        f(points, c) = f(first, c)
+      end do
+    end associate
   end subroutine share_forces
 
-  !> f <- (sum V f + force) / sum V at some points.
-  pure subroutine share(points, force, volume, f)
-    integer,  intent(in)    :: points(:)
-    real(wp), intent(in)    :: force       !! on all of the points [N/m]
-    real(wp), intent(in)    :: volume(:)   !! V (n) [m^2]
-    real(wp), intent(inout) :: f(:)        !! one component (n) [N/m^3]
-
-    f(points) = (force + ordered_sum(volume(points) * f(points))) / ordered_sum(volume(points))
-  end subroutine share
-
-  !> - sum V f of the internal forces: f contains the applied force as well.
-  pure subroutine take_reactions(self, volume, t, f)
+  !> - sum V f of the internal forces: f, the same at all points, contains the applied force as
+  !> well. Not the sum from before: after a restart there is only f.
+  pure subroutine take_reactions(self, sums, t, f)
     class(loaded_platen_t), intent(inout) :: self
-    real(wp),               intent(in)    :: volume(:), t, f(:, :)
+    real(wp),               intent(in)    :: sums(n_sums), t, f(:, :)
 
-    self%force = merge(reaction(self%points, volume, f), 0.0_wp, self%as_one) &
-      + self%factor%rate(t) * self%full
+    self%force = self%factor%rate(t) * self%full &
+      - merge(sums(3) * f(self%points(1), :), 0.0_wp, self%as_one)
   end subroutine take_reactions
 
   !> Work of the applied force on the motion of the platen.

@@ -7,7 +7,7 @@
 module pd_rigid_support
   use pd_kinds, only: wp
   use pd_point_sets, only: point_set_t
-  use pd_supports, only: reaction, support_t
+  use pd_supports, only: n_sums, support_t
   use pd_tables, only: table_t
   implicit none
   private
@@ -42,8 +42,7 @@ contains
     real(wp),          intent(in) :: mass(:)             !! rho V of all points (n) [kg/m]
     integer :: k
 
-    support%name = set%name
-    allocate (support%points(size(set%points)), source=set%points)
+    call support%hold(set)
     support%prescribed = prescribed
     support%velocity = velocity
     do k = 1, size(set%points)
@@ -67,22 +66,27 @@ contains
     real(wp),               intent(inout) :: u(:, :), v(:, :)
     integer :: c
 
-    do c = 1, 2
-      if (.not. self%prescribed(c)) cycle
-      u(self%points, c) = self%place(c) + self%velocity(c)%integral(t)
-      v(self%points, c) = self%velocity(c)%rate(t)
-    end do
+    if (size(self%points) == 0) return
+    associate (points => self%points(self%near(1):self%near(2)), first => self%points(1))
+      do c = 1, 2
+        if (.not. self%prescribed(c)) cycle
+        u(first, c) = self%place(c) + self%velocity(c)%integral(t)
+        v(first, c) = self%velocity(c)%rate(t)
+        u(points, c) = u(first, c)
+        v(points, c) = v(first, c)
+      end do
+    end associate
   end subroutine prescribe
 
   !> - sum V f over the prescribed components.
-  pure subroutine take_reactions(self, volume, t, f)
+  pure subroutine take_reactions(self, sums, t, f)
     class(rigid_support_t), intent(inout) :: self
-    real(wp),               intent(in)    :: volume(:), t, f(:, :)
+    real(wp),               intent(in)    :: sums(n_sums), t, f(:, :)
 
-    associate (unused => t)
+    associate (unused => t, unused_f => f)
     end associate
     self%force_before = self%force
-    self%force = merge(reaction(self%points, volume, f), 0.0_wp, self%prescribed)
+    self%force = merge(-sums(:2), 0.0_wp, self%prescribed)
   end subroutine take_reactions
 
   pure real(wp) function work(self, v, t, t_next)

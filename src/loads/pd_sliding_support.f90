@@ -7,6 +7,7 @@ module pd_sliding_support
   use pd_kinds, only: wp
   use pd_point_sets, only: point_set_t
   use pd_rigid_support, only: new_rigid_support, rigid_support_t
+  use pd_supports, only: n_sums
   use pd_tables, only: table_t
   implicit none
   private
@@ -49,17 +50,22 @@ contains
 
     associate (not_moved => u)
     end associate
-    do c = 1, 2
-      if (self%prescribed(c)) v(self%points, c) = self%velocity(c)%rate(t)
-    end do
+    if (size(self%points) == 0) return
+    associate (points => self%points(self%near(1):self%near(2)), first => self%points(1))
+      do c = 1, 2
+        if (.not. self%prescribed(c)) cycle
+        v(first, c) = self%velocity(c)%rate(t)
+        v(points, c) = v(first, c)
+      end do
+    end associate
   end subroutine prescribe
 
   !> - 2 sum V f along the normal.
-  pure subroutine take_reactions(self, volume, t, f)
+  pure subroutine take_reactions(self, sums, t, f)
     class(sliding_support_t), intent(inout) :: self
-    real(wp),                 intent(in)    :: volume(:), t, f(:, :)
+    real(wp),                 intent(in)    :: sums(n_sums), t, f(:, :)
 
-    call self%rigid_support_t%take_reactions(volume, t, f)
+    call self%rigid_support_t%take_reactions(sums, t, f)
     self%force = 2.0_wp * self%force
   end subroutine take_reactions
 

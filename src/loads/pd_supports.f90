@@ -1,23 +1,32 @@
 !> Supports: they fix or move points of the model, and take their reactions.
 !>
 !> The time loop knows only this interface. A new kind is a module with an extension of `support_t`
-!> and a line in `pd_setup_loads`.
+!> and a line in `pd_setup_loads`. What a support needs of the forces at its points are sums: each
+!> rank adds up its own points, block by block, and the sums of all blocks are added in their order.
 !> Source: doc/theory.md, section 7.
 module pd_supports
-  use pd_kinds, only: ordered_sum, wp
+  use pd_blocks, only: blocks_t
+  use pd_kinds, only: n_block, ordered_sum, wp
+  use pd_point_sets, only: point_set_t
+  use pd_ranks, only: ranks_t
   use pd_tables, only: table_t
   implicit none
   private
 
-  public :: support_t, support_item_t, supports_t, reaction
+  public :: support_t, support_item_t, supports_t, n_sums
+
+  integer, parameter :: n_sums = 3   !! numbers that a support adds up over its points
 
   !> A set of points with its motion, and the force of the present step.
   type, abstract :: support_t
     character(:), allocatable :: name
     character(:), allocatable :: load_kind   !! in a word; allocated if it includes a load
-    integer, allocatable :: points(:)
+    integer, allocatable :: points(:)        !! ascending
+    integer  :: near(2) = [1, 0]             !! first and last of them that this rank moves
     real(wp) :: force(2) = 0.0_wp            !! that the support applies to the body [N/m]
   contains
+    procedure :: hold
+    procedure :: add_up => add_up_forces
     procedure(mark_prescribed), deferred :: mark_prescribed
     procedure(prescribe),       deferred :: prescribe
     procedure(take_reactions),  deferred :: take_reactions
@@ -48,12 +57,13 @@ module pd_supports
     end subroutine prescribe
 
     !> Find the force that the support applies to the body, and those conjugate to its motion.
-    pure subroutine take_reactions(self, volume, t, f)
-      import :: support_t, wp
+    pure subroutine take_reactions(self, sums, t, f)
+      import :: n_sums, support_t, wp
       class(support_t), intent(inout) :: self
-      real(wp),         intent(in)    :: volume(:)    !! V (n) [m^2]
+      real(wp),         intent(in)    :: sums(n_sums) !! over its points: before they are shared
       real(wp),         intent(in)    :: t            !! [s]
-      real(wp),         intent(in)    :: f(:, :)      !! force density, with loads (n,2) [N/m^3]
+      real(wp),         intent(in)    :: f(:, :)      !! force density, with loads, shared (n,2)
+                                                      !! [N/m^3]
     end subroutine take_reactions
 
     !> Work that the support does from t to t_next on the body and on its own points: by the
@@ -76,7 +86,15 @@ module pd_supports
   !> The supports of a model.
   type :: supports_t
     type(support_item_t), allocatable :: items(:)
+    integer, allocatable, private :: runs(:, :)     !! support, first and last of its points in a
+                                                    !! block, block by block (3, runs)
+    integer, allocatable, private :: run_ends(:)    !! last run of every rank; 0 (0:ranks)
+    integer, private :: first_run = 1, last_run = 0 !! of this rank
+    type(ranks_t), private :: ranks
   contains
+    procedure :: divide
+    procedure :: bytes
+    procedure :: balance
     procedure :: mark_prescribed => mark_all_prescribed
     procedure :: prescribe => prescribe_all
     procedure :: share_forces => share_all_forces
@@ -86,32 +104,45 @@ module pd_supports
 
 contains
 
-  !> Force on the body that balances a force density at some points: - sum V f.
-  pure function reaction(points, volume, f) result(force)
-    integer,  intent(in) :: points(:)
-    real(wp), intent(in) :: volume(:)                 !! V (n) [m^2]
-    real(wp), intent(in) :: f(:, :)                   !! (n,2) [N/m^3]
-    real(wp) :: force(2)
+  !> Hold the points of a set, all of them on this rank.
+  pure subroutine hold(self, set)
+    class(support_t),  intent(inout) :: self
+    type(point_set_t), intent(in)    :: set
 
-    force(1) = -ordered_sum(volume(points) * f(points, 1))
-    force(2) = -ordered_sum(volume(points) * f(points, 2))
-  end function reaction
+    self%name = set%name
+    allocate (self%points(size(set%points)), source=set%points)
+    self%near = [1, size(set%points)]
+  end subroutine hold
 
   ! --- defaults, right for most supports
 
+  !> What some of its points add to the sums: V f, and V.
+  pure function add_up_forces(self, first, last, volume, f) result(sums)
+    class(support_t), intent(in) :: self
+    integer,          intent(in) :: first, last       !! of its points
+    real(wp),         intent(in) :: volume(:)         !! V (n) [m^2]
+    real(wp),         intent(in) :: f(:, :)           !! (n,2) [N/m^3]
+    real(wp) :: sums(n_sums)                          !! x, y [N/m], V [m^2]
+
+    associate (points => self%points(first:last))
+      sums = [ordered_sum(volume(points) * f(points, 1)), &
+        ordered_sum(volume(points) * f(points, 2)), ordered_sum(volume(points))]
+    end associate
+  end function add_up_forces
+
   !> Change the force density so that points which move as one keep doing so: here there are none.
-  pure subroutine share_nothing(self, volume, t, f)
+  pure subroutine share_nothing(self, sums, t, f)
     class(support_t), intent(in)    :: self
-    real(wp),         intent(in)    :: volume(:)      !! V (n) [m^2]
+    real(wp),         intent(in)    :: sums(n_sums)   !! over its points
     real(wp),         intent(in)    :: t              !! [s]
     real(wp),         intent(inout) :: f(:, :)        !! force density, with loads (n,2) [N/m^3]
 
-    associate (unused => self, unused_volume => volume, unused_t => t, unchanged => f)
+    associate (unused => self, unused_sums => sums, unused_t => t, unchanged => f)
     end associate
   end subroutine share_nothing
 
-  !> Mark the points whose force and displacement the support looks at: its own; and those whose
-  !> velocity it looks at: none.
+  !> Mark the points whose displacement the history tells: its own; and those whose velocity the
+  !> support looks at: none.
   pure subroutine mark_points(self, held, pushed)
     class(support_t), intent(in)    :: self
     logical,          intent(inout) :: held(:), pushed(:)   !! (n)
@@ -180,30 +211,144 @@ contains
   end subroutine prescribe_all
 
   !> Share forces among points that move as one; after all loads have been added.
-  pure subroutine share_all_forces(self, volume, t, f)
+  subroutine share_all_forces(self, volume, t, f)
     class(supports_t), intent(in)    :: self
     real(wp),          intent(in)    :: volume(:)     !! V (n) [m^2]
     real(wp),          intent(in)    :: t             !! [s]
     real(wp),          intent(inout) :: f(:, :)       !! force density, with loads (n,2) [N/m^3]
-    integer :: k
+    real(wp) :: sums(n_sums, size(self%items))
+    integer  :: k
 
+    if (.not. any([(allocated(self%items(k)%support%load_kind), k=1, size(self%items))])) return
+    sums = sums_of_all(self, volume, f)
     do k = 1, size(self%items)
-      call self%items(k)%support%share_forces(volume, t, f)
+      call self%items(k)%support%share_forces(sums(:, k), t, f)
     end do
   end subroutine share_all_forces
 
   !> Find the forces that the supports apply to the body at time t.
-  pure subroutine take_all_reactions(self, volume, t, f)
+  subroutine take_all_reactions(self, volume, t, f)
     class(supports_t), intent(inout) :: self
     real(wp),          intent(in)    :: volume(:)     !! V (n) [m^2]
     real(wp),          intent(in)    :: t             !! [s]
     real(wp),          intent(in)    :: f(:, :)       !! after `share_forces` (n,2) [N/m^3]
-    integer :: k
+    real(wp) :: sums(n_sums, size(self%items))
+    integer  :: k
 
+    sums = sums_of_all(self, volume, f)
     do k = 1, size(self%items)
-      call self%items(k)%support%take_reactions(volume, t, f)
+      call self%items(k)%support%take_reactions(sums(:, k), t, f)
     end do
   end subroutine take_all_reactions
+
+  !> Both, with the same sums: one message.
+  subroutine balance(self, volume, t, f)
+    class(supports_t), intent(inout) :: self
+    real(wp),          intent(in)    :: volume(:)     !! V (n) [m^2]
+    real(wp),          intent(in)    :: t             !! [s]
+    real(wp),          intent(inout) :: f(:, :)       !! force density, with loads (n,2) [N/m^3]
+    real(wp) :: sums(n_sums, size(self%items))
+    integer  :: k
+
+    sums = sums_of_all(self, volume, f)
+    do k = 1, size(self%items)
+      call self%items(k)%support%share_forces(sums(:, k), t, f)
+      call self%items(k)%support%take_reactions(sums(:, k), t, f)
+    end do
+  end subroutine balance
+
+  !> Sums over the points of every support: the same bits for any number of ranks.
+  function sums_of_all(self, volume, f) result(sums)
+    class(supports_t), intent(in) :: self
+    real(wp),          intent(in) :: volume(:)        !! V (n) [m^2]
+    real(wp),          intent(in) :: f(:, :)          !! (n,2) [N/m^3]
+    real(wp) :: sums(n_sums, size(self%items))
+    real(wp), allocatable :: parts(:, :)
+    integer :: k
+
+    sums = 0.0_wp
+    if (.not. allocated(self%runs)) then
+      do k = 1, size(self%items)
+        sums(:, k) = self%items(k)%support%add_up(1, size(self%items(k)%support%points), volume, f)
+      end do
+      return
+    end if
+    allocate (parts(n_sums, size(self%runs, 2)))
+    do k = self%first_run, self%last_run
+      associate (run => self%runs(:, k))
+        parts(:, k) = self%items(run(1))%support%add_up(run(2), run(3), volume, f)
+      end associate
+    end do
+    call self%ranks%spread_out(parts, self%run_ends)
+    do k = 1, size(parts, 2)
+      associate (support => self%runs(1, k))
+        sums(:, support) = sums(:, support) + parts(:, k)
+      end associate
+    end do
+  end function sums_of_all
+
+  !> From now on this rank adds up the points in its own blocks, and moves those in the rows that it
+  !> keeps and the first one of every support.
+  pure subroutine divide(self, blocks, kept)
+    class(supports_t), intent(inout) :: self
+    type(blocks_t),    intent(in)    :: blocks
+    integer,           intent(in)    :: kept(2)       !! first and last row
+    integer, allocatable :: runs(:, :), block_of(:)
+    integer :: block, k, n, next(size(self%items))
+
+    n = 0
+    do k = 1, size(self%items)
+      n = n + size(self%items(k)%support%points)
+    end do
+    allocate (runs(3, n), block_of(n))
+    n = 0
+    next = 1
+    do block = 1, blocks%count_of_all()
+      do k = 1, size(self%items)
+        associate (points => self%items(k)%support%points)
+          if (.not. is_in(points, next(k), block, blocks)) cycle
+          n = n + 1
+          block_of(n) = block
+          runs(:2, n) = [k, next(k)]
+          do while (is_in(points, next(k), block, blocks))
+            next(k) = next(k) + 1
+          end do
+          runs(3, n) = next(k) - 1
+        end associate
+      end do
+    end do
+    do k = 1, size(self%items)
+      associate (support => self%items(k)%support)
+        support%near = [count(support%points < kept(1)) + 1, count(support%points <= kept(2))]
+      end associate
+    end do
+    self%ranks = blocks%ranks
+    self%runs = runs(:, :n)
+    if (allocated(self%run_ends)) deallocate (self%run_ends)
+    allocate (self%run_ends(0:blocks%ranks%count), source=n)
+    self%run_ends(0) = 0
+    do k = 1, merge(blocks%ranks%count, 0, allocated(blocks%ranks%before))
+      self%run_ends(k) = count(block_of(:n) <= blocks%ranks%before(k))
+    end do
+    self%first_run = self%run_ends(blocks%ranks%mine) + 1
+    self%last_run = self%run_ends(blocks%ranks%mine + 1)
+  end subroutine divide
+
+  !> What ranks tell each other in every step.
+  pure integer function bytes(self)
+    class(supports_t), intent(in) :: self   !! divided
+
+    bytes = 8 * n_sums * size(self%runs, 2)
+  end function bytes
+
+  !> Whether a point of some is there and in a block.
+  pure logical function is_in(points, number, block, blocks)
+    integer,        intent(in) :: points(:), number, block
+    type(blocks_t), intent(in) :: blocks
+
+    is_in = number <= size(points)
+    if (is_in) is_in = (points(number) - blocks%ends(1)) / n_block + 1 == block
+  end function is_in
 
   !> Work that the supports do from t to t_next.
   pure real(wp) function work_of_all(self, v, t, t_next) result(work)

@@ -23,14 +23,15 @@ module pd_division
     integer :: rows = 0
     integer :: halo = 0     !! rows of other ranks that its families read
     integer :: others = 0   !! ranks that own these
+    integer :: inner = 0    !! rows in blocks that need none of them
   end type share_t
 
   !> What a rank sends in every step of a motion.
   type :: traffic_t
-    integer :: exchanges = 2        !! with each of the other ranks that own its halo
-    integer :: numbers = 6          !! per row of the halo, in all of them together
-    integer :: reductions = 2       !! over all ranks: signals and clocks; whether the state failed
-    integer :: reduced = 20         !! bytes that go through these
+    !> Per row of the halo, before the gradient and before the divergence.
+    integer :: numbers(2) = [2, 4]
+    integer :: reductions = 1       !! over all ranks that are waited for: sums of the supports
+    integer :: reduced = 0          !! bytes that go through these
   end type traffic_t
 
 contains
@@ -41,7 +42,8 @@ contains
     integer,       intent(in) :: ranks
     type(share_t) :: shares(ranks)
     integer, allocatable :: points(:), rows(:)
-    integer :: last(0:ranks), k, other, ends(2)
+    integer :: reached(2)
+    integer :: last(0:ranks), block, k, other, ends(2)
 
     points = points_in_blocks(model%shown, model%blocks)
     last = cuts(points, ranks)
@@ -51,6 +53,13 @@ contains
       rows = model%operators%needed_rows(ends(1), ends(2))
       shares(k) = share_t(sum(points(last(k - 1) + 1:last(k))), ends(2) - ends(1) + 1, &
         count(rows < ends(1) .or. rows > ends(2)))
+      do block = last(k - 1) + 1, last(k)
+        associate (lo => model%blocks%lo(block), hi => model%blocks%hi(block))
+          reached = model%operators%reached_rows(lo, hi)
+          if (reached(1) >= ends(1) .and. reached(2) <= ends(2)) &
+            shares(k)%inner = shares(k)%inner + hi - lo + 1
+        end associate
+      end do
       do other = 1, ranks
         if (other == k .or. last(other) == last(other - 1)) cycle
         if (any(rows >= model%blocks%lo(last(other - 1) + 1) .and. &
@@ -60,20 +69,19 @@ contains
   end function shares
 
   !> What goes between ranks in every step: the displacement, the force tensor and the vector of the
-  !> relaxing control in the halo; what supports and loads look at, and images in smooth bearings.
+  !> relaxing control in the halo; sums of supports, what loads look at, and images in smooth
+  !> bearings. Whether the state failed, signals and clocks are not waited for.
   type(traffic_t) function traffic(model)
     type(model_t), intent(inout) :: model
-    type(shared_rows_t) :: sets(4)
+    type(shared_rows_t) :: sets(3)
     integer :: k
 
-    if (allocated(model%operators%relaxing)) then
-      traffic%exchanges = 3
-      traffic%numbers = 8
-    end if
+    if (allocated(model%operators%relaxing)) traffic%numbers(2) = 6
+    traffic%reduced = model%supports%bytes()
     call share_rows(model)
-    sets(:2) = [model%shared, model%pushed]
+    sets(1) = model%pushed
     call model%operators%mirror%divide(model%blocks)
-    sets(3:) = model%operators%mirror%known_rows()
+    sets(2:) = model%operators%mirror%known_rows()
     do k = 1, size(sets)
       if (.not. allocated(sets(k)%rows)) cycle
       if (size(sets(k)%rows) == 0) cycle
@@ -103,6 +111,7 @@ contains
     do k = 1, size(model%loads%items)
       call model%loads%items(k)%load%divide(model%blocks)
     end do
+    call model%supports%divide(model%blocks, model%operators%domain%kept(model%operators%n))
     call share_rows(model)
   end subroutine divide_model
 

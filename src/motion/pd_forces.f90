@@ -43,10 +43,8 @@ contains
       call internal_forces(model%operators, model%materials, points%volume, state, work, timing, &
         failed_row)
       call model%loads%add_forces(points%volume, t, state%force)
-      call model%shared%bring(state%force)
       call model%pushed%bring(state%velocity)
-      call model%supports%share_forces(points%volume, t, state%force)
-      call model%supports%take_reactions(points%volume, t, state%force)
+      call model%supports%balance(points%volume, t, state%force)
     end associate
     call timing%lap(kernel_boundaries)
   end subroutine forces
@@ -60,30 +58,69 @@ contains
     type(block_work_t), intent(inout) :: work
     type(timing_t),     intent(inout) :: timing
     integer,            intent(out)   :: failed_row
-    integer :: block, n_blocks
 
-    n_blocks = operators%domain%blocks%count
-    call work%fit(operators%domain%blocks)
-    call operators%take_in(state%displacement, operators%mirror%place)
-    !$omp parallel do schedule(static) default(none) private(block) &
-    !$omp shared(n_blocks, operators, materials, volume, state, work, timing)
-    do block = 1, n_blocks
-      call stress_of_block(block, operators, materials, volume, state, work, timing%blocks)
-    end do
-    !$omp end parallel do
-    failed_row = operators%domain%blocks%lowest_number(work%failed)
-    call timing%lap_blocks(kernel_gradient, work%times)
-    call operators%share()
-    !$omp parallel do schedule(static) default(none) private(block) &
-    !$omp shared(n_blocks, operators, state)
-    do block = 1, n_blocks
-      call operators%force_block(operators%domain%blocks%lo(block), &
-        operators%domain%blocks%hi(block), state%displacement, state%force)
-    end do
-    !$omp end parallel do
+    associate (domain => operators%domain)
+      call work%fit(domain%blocks)
+      call operators%begin_taking_in(state%displacement, operators%mirror%place)
+      call stress_of_blocks(domain%inner, operators, materials, volume, state, work, timing%blocks)
+      call operators%finish_taking_in(state%displacement)
+      call stress_of_blocks(domain%outer, operators, materials, volume, state, work, timing%blocks)
+      call timing%lap_blocks(kernel_gradient, work%times)
+      call work%begin_telling(domain%blocks)
+      call operators%begin_sharing()
+      call force_of_blocks(domain%inner, operators, state)
+      call operators%finish_sharing()
+      call force_of_blocks(domain%outer, operators, state)
+    end associate
+    call work%hear(failed_row)
     call operators%mirror%hand_back(state%force)
     call timing%lap(kernel_force)
   end subroutine internal_forces
+
+  !> H, stress and force tensor of some blocks, while the halo may be on its way.
+  subroutine stress_of_blocks(blocks, operators, materials, volume, state, work, timed)
+    integer,            intent(in)    :: blocks(:)
+    class(operators_t), intent(inout) :: operators
+    type(materials_t),  intent(in)    :: materials
+    real(wp),           intent(in), contiguous :: volume(:)   !! V (n) [m^2]
+    type(state_t),      intent(inout) :: state
+    type(block_work_t), intent(inout) :: work
+    logical,            intent(in)    :: timed
+    integer :: first, k, last, length
+
+    length = operators%domain%halo%piece(size(blocks))
+    do first = 1, size(blocks), length
+      last = min(first + length - 1, size(blocks))
+      !$omp parallel do schedule(static) default(none) private(k) &
+      !$omp shared(first, last, blocks, operators, materials, volume, state, work, timed)
+      do k = first, last
+        call stress_of_block(blocks(k), operators, materials, volume, state, work, timed)
+      end do
+      !$omp end parallel do
+      call operators%domain%halo%help()
+    end do
+  end subroutine stress_of_blocks
+
+  !> The force density of some blocks, likewise.
+  subroutine force_of_blocks(blocks, operators, state)
+    integer,            intent(in)    :: blocks(:)
+    class(operators_t), intent(inout) :: operators
+    type(state_t),      intent(inout) :: state
+    integer :: first, k, last, length
+
+    length = operators%domain%halo%piece(size(blocks))
+    do first = 1, size(blocks), length
+      last = min(first + length - 1, size(blocks))
+      !$omp parallel do schedule(static) default(none) private(k) &
+      !$omp shared(first, last, blocks, operators, state)
+      do k = first, last
+        call operators%force_block(operators%domain%blocks%lo(blocks(k)), &
+          operators%domain%blocks%hi(blocks(k)), state%displacement, state%force)
+      end do
+      !$omp end parallel do
+      call operators%domain%halo%help()
+    end do
+  end subroutine force_of_blocks
 
   !> H, stress and force tensor of one block.
   subroutine stress_of_block(block, operators, materials, volume, state, work, timed)

@@ -36,7 +36,7 @@ module pd_model
     class(operators_t), allocatable :: operators
     type(materials_t) :: materials
     type(blocks_t)    :: blocks              !! of the rows of all fields; those of this rank
-    type(shared_rows_t) :: shared            !! rows whose force and displacement supports look at
+    type(shared_rows_t) :: shared            !! rows of the supports
     type(shared_rows_t) :: pushed            !! rows whose velocity loads look at
     type(shared_rows_t) :: probed            !! those of the probes
     type(points_t)    :: points
@@ -130,7 +130,6 @@ contains
     end associate
     call model%supports%prescribe(0.0_wp, state%displacement, state%velocity)
     call model%loads%add_forces(model%points%volume, 0.0_wp, state%force)
-    call model%shared%bring(state%force)
     call model%supports%share_forces(model%points%volume, 0.0_wp, state%force)
     if (allocated(model%initial)) &   ! the body leans on them from the start
       call model%supports%take_reactions(model%points%volume, 0.0_wp, state%force)

@@ -157,7 +157,6 @@ contains
       relaxed%moves = k
       if (relaxed%failed_row > 0) exit
       call model%loads%add_forces(model%points%volume, t, state%force)
-      call model%shared%bring(state%force)
       call model%supports%share_forces(model%points%volume, t, state%force)
       call timing%lap(kernel_boundaries)
       call add_up(model, state, relaxation)

@@ -8,10 +8,13 @@ module pd_state
   use pd_labels, only: label_t
   use pd_law, only: law_points_t
   use pd_pages, only: clear_rows, forget_rows
+  use pd_ranks, only: messages_t
   implicit none
   private
 
-  public :: state_t, block_work_t
+  public :: state_t, block_work_t, n_news
+
+  integer, parameter :: n_news = 4   !! numbers of which a step finds the largest on any rank
 
   !> Fields over all rows, fictitious points included; stress, history, strength and initial
   !> strain belong to the laws.
@@ -42,8 +45,13 @@ module pd_state
     integer,  allocatable :: failed(:)        !! first row with det F <= 0, 0: none (blocks)
     integer,  allocatable :: flowed(:)        !! rows that flow in this step (blocks)
     real(wp), allocatable :: times(:, :)      !! clock at the ends of kernels (3,blocks) [s]
+    integer :: news(n_news) = 0               !! in: of this rank; out: the largest of any
+    integer, private :: told(n_news + 1) = 0
+    type(messages_t), private :: messages
   contains
     procedure :: fit
+    procedure :: begin_telling
+    procedure :: hear
   end type block_work_t
 
   !> Make room for unloaded points, with memory for some rows only.
@@ -78,6 +86,28 @@ contains
       self%relaxed(blocks%count), self%times(3, blocks%count), source=0.0_wp)
     allocate (self%failed(blocks%count), self%flowed(blocks%count), source=0)
   end subroutine fit
+
+  !> Begin to tell the other ranks whether the state of this one failed, and its news. While this
+  !> is on its way a step goes on: what it does with a state that has failed is looked at by nobody.
+  subroutine begin_telling(self, blocks)
+    class(block_work_t), intent(inout) :: self
+    type(blocks_t),      intent(in)    :: blocks
+    integer :: lowest
+
+    lowest = minval(self%failed, mask=self%failed > 0)   ! huge where there is none
+    self%told = [huge(lowest) - lowest, self%news]
+    call blocks%ranks%begin_largest(self%told, self%messages)
+  end subroutine begin_telling
+
+  !> The first row of all whose state failed, 0: none; and the news.
+  subroutine hear(self, failed_row)
+    class(block_work_t), intent(inout) :: self
+    integer,             intent(out)   :: failed_row
+
+    call self%messages%await(self%told)
+    failed_row = merge(huge(failed_row) - self%told(1), 0, self%told(1) > 0)
+    self%news = self%told(2:)
+  end subroutine hear
 
   !> Show all fields to a visitor.
   subroutine visit(self, visitor)

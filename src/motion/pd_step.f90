@@ -7,7 +7,7 @@ module pd_step
   use pd_kinds, only: wp
   use pd_ledger, only: ledger_t
   use pd_model, only: damping_frame, model_t
-  use pd_state, only: block_work_t, state_t
+  use pd_state, only: block_work_t, n_news, state_t
   use pd_timing, only: kernel_boundaries, kernel_motion, timing_t
   use pd_verlet, only: kicks_t, move_points
   implicit none
@@ -18,6 +18,7 @@ module pd_step
   !> Work space of the steps, and what one step passes on to the next.
   type :: step_work_t
     type(block_work_t), private :: blocks
+    integer :: news(n_news) = 0   !! before a step: of this rank; after it: the largest of any
     !> v is v^{n+1/2}: the second half kick of the last step comes together with the first one of
     !> the next, which saves a pass through memory.
     logical, private :: open = .false.
@@ -54,7 +55,9 @@ contains
       call timing%lap(kernel_motion)
       call model%supports%prescribe(t_next, state%displacement, state%velocity)
       call timing%lap(kernel_boundaries)
+      blocks%news = work%news
       call forces(model, t_next, state, blocks, timing, failed_row)
+      work%news = blocks%news
       ledger%plastic = ledger%plastic + blocks%dissipated
       ledger%control = ledger%control + blocks%relaxed
       ledger%outer_work = ledger%outer_work + (model%supports%work(state%velocity, t, t_next) &

@@ -27,7 +27,7 @@ module pd_balanced_list
     real(wp), allocatable, private :: own(:, :)        !! sum_j w_ij (n,2) [m^3]
     real(wp), allocatable, private :: affine(:, :)     !! c H^0 (n,4) xx xy yx yy [N/m^6]
   contains
-    procedure :: take_in
+    procedure :: finish_taking_in
     procedure :: divergence_sums_block
     procedure :: control_sums_block
     procedure :: control_energy
@@ -85,13 +85,12 @@ contains
   end subroutine residual
 
   !> Make u readable for the sums, and for the control find c H^0.
-  subroutine take_in(self, u, moved)
+  subroutine finish_taking_in(self, u)
     class(balanced_list_t), intent(inout) :: self
     real(wp), intent(inout), contiguous :: u(:, :)   !! (n,2) [m]; its halo is brought up to date
-    real(wp), intent(in), optional :: moved(:)       !! see operators_t
     integer :: block, lo, hi, k
 
-    call self%bond_list_t%take_in(u, moved)
+    call self%bond_list_t%finish_taking_in(u)
     if (.not. allocated(self%control)) return
     if (.not. allocated(self%affine)) allocate (self%affine(self%n, 4))
     !$omp parallel do schedule(static) default(none) shared(self, u) private(block, lo, hi, k)
@@ -106,7 +105,7 @@ contains
     end do
     !$omp end parallel do
     call self%domain%halo%exchange(self%affine)
-  end subroutine take_in
+  end subroutine finish_taking_in
 
   !> G[u] of rows lo to hi with the plain weights, omega V_j xi.
   pure subroutine plain_gradient_sums(self, lo, hi, u, g)

@@ -38,7 +38,7 @@ module pd_bond_list
     procedure :: bonds
     procedure :: fewest_bonds
     procedure :: memory
-    procedure :: needed_rows
+    procedure :: needed_rows, reached_rows
   end type bond_list_t
 
 contains
@@ -393,5 +393,16 @@ contains
     end do
     rows = pack([(i, i=1, self%n)], needed)
   end function needed_rows
+
+  !> The first and the last of them.
+  pure function reached_rows(self, first, last) result(ends)
+    class(bond_list_t), intent(in) :: self
+    integer, intent(in) :: first, last
+    integer :: ends(2)
+
+    associate (neighbours => self%neighbour(self%first(first):self%first(last + 1) - 1))
+      ends = [minval(neighbours), maxval(neighbours)]
+    end associate
+  end function reached_rows
 
 end module pd_bond_list

@@ -15,6 +15,8 @@ module pd_domain
     type(halo_t)   :: halo
     !> Rows between which this rank knows fields: its own and the halo.
     integer :: known(2) = [1, 0]
+    !> Blocks whose families read no row of another rank, and the others.
+    integer, allocatable :: inner(:), outer(:)
   contains
     procedure :: take_part
     procedure :: meet
@@ -28,9 +30,12 @@ contains
   !> The rows between which all points lie: all of them belong to this rank.
   pure type(domain_t) function new_domain(first, last) result(domain)
     integer, intent(in) :: first, last
+    integer :: k
 
     domain%blocks = new_blocks(first, last)
     domain%known = [first, last]
+    domain%inner = [(k, k=1, domain%blocks%count)]
+    allocate (domain%outer(0))
   end function new_domain
 
   !> From now on this rank has its own blocks only.

@@ -1,9 +1,10 @@
 !> Rows of a field that families read and that other ranks own: the halo of the rows of this rank.
 !>
 !> The operators bring every field up to date once it is whole, and before a family reads it.
+!> Families that need nothing of the halo can work while it is on its way.
 module pd_halo
   use pd_kinds, only: wp
-  use pd_ranks, only: ranks_t
+  use pd_ranks, only: messages_t, ranks_t
   implicit none
   private
 
@@ -17,9 +18,14 @@ module pd_halo
     integer, allocatable :: sent(:), received(:)             !! rows, partner by partner
     integer, allocatable :: sent_ends(:), received_ends(:)   !! last of each; 0: before them (0:)
     real(wp), allocatable, private :: outbox(:), inbox(:)
+    type(messages_t), private :: messages
   contains
     procedure :: meet
     procedure :: exchange
+    procedure :: begin
+    procedure :: help
+    procedure :: piece
+    procedure :: finish
   end type halo_t
 
 contains
@@ -59,33 +65,95 @@ contains
   subroutine exchange(self, field)
     class(halo_t), intent(inout) :: self
     real(wp), intent(inout), contiguous :: field(:, :)   !! (rows, components)
-    integer :: c, k, n, width
+
+    call self%begin(field)
+    call self%finish(field)
+  end subroutine exchange
+
+  !> Begin to bring the rows of the halo up to date; those of a second field go with them. Until it
+  !> is finished nothing else is exchanged, and the halo is that of before.
+  subroutine begin(self, field, second)
+    class(halo_t), intent(inout) :: self
+    real(wp), intent(in), contiguous :: field(:, :)             !! (rows, components)
+    real(wp), intent(in), contiguous, optional :: second(:, :)  !! likewise
+    integer :: k, n, width
 
     if (.not. allocated(self%partners)) return
     width = size(field, 2)
+    if (present(second)) width = width + size(second, 2)
     call make_room(self%outbox, width * size(self%sent))
     call make_room(self%inbox, width * size(self%received))
+    n = 0
     do k = 1, size(self%partners)
-      n = width * self%sent_ends(k - 1)
       associate (rows => self%sent(self%sent_ends(k - 1) + 1:self%sent_ends(k)))
-        do c = 1, width
-          self%outbox(n + 1:n + size(rows)) = field(rows, c)
-          n = n + size(rows)
-        end do
+        call pack_rows(rows, field, self%outbox, n)
+        if (present(second)) call pack_rows(rows, second, self%outbox, n)
       end associate
     end do
-    call self%ranks%swap(self%partners, width * self%sent_ends, self%outbox, &
-      width * self%received_ends, self%inbox)
+    call self%ranks%begin_swap(self%partners, width * self%sent_ends, self%outbox, &
+      width * self%received_ends, self%inbox, self%messages)
+  end subroutine begin
+
+  !> Help the messages on, from time to time.
+  subroutine help(self)
+    class(halo_t), intent(inout) :: self
+
+    if (allocated(self%partners)) call self%messages%help()
+  end subroutine help
+
+  !> Of a number of blocks, how many are worked on between two calls of `help`.
+  pure integer function piece(self, blocks) result(length)
+    class(halo_t), intent(in) :: self
+    integer,       intent(in) :: blocks
+    integer, parameter :: pieces = 4
+
+    length = max(1, blocks)
+    if (allocated(self%partners)) length = max(1, (blocks + pieces - 1) / pieces)
+  end function piece
+
+  !> Wait for the rows of the halo, and take them.
+  subroutine finish(self, field, second)
+    class(halo_t), intent(inout) :: self
+    real(wp), intent(inout), contiguous :: field(:, :)             !! as it began
+    real(wp), intent(inout), contiguous, optional :: second(:, :)  !! likewise
+    integer :: k, n
+
+    if (.not. allocated(self%partners)) return
+    call self%messages%await(self%inbox)
+    n = 0
     do k = 1, size(self%partners)
-      n = width * self%received_ends(k - 1)
       associate (rows => self%received(self%received_ends(k - 1) + 1:self%received_ends(k)))
-        do c = 1, width
-          field(rows, c) = self%inbox(n + 1:n + size(rows))
-          n = n + size(rows)
-        end do
+        call unpack_rows(rows, self%inbox, n, field)
+        if (present(second)) call unpack_rows(rows, self%inbox, n, second)
       end associate
     end do
-  end subroutine exchange
+  end subroutine finish
+
+  pure subroutine pack_rows(rows, field, box, n)
+    integer,  intent(in)    :: rows(:)
+    real(wp), intent(in)    :: field(:, :)
+    real(wp), intent(inout) :: box(:)
+    integer,  intent(inout) :: n             !! numbers in the box
+    integer :: c
+
+    do c = 1, size(field, 2)
+      box(n + 1:n + size(rows)) = field(rows, c)
+      n = n + size(rows)
+    end do
+  end subroutine pack_rows
+
+  pure subroutine unpack_rows(rows, box, n, field)
+    integer,  intent(in)    :: rows(:)
+    real(wp), intent(in)    :: box(:)
+    integer,  intent(inout) :: n             !! numbers that have been taken from the box
+    real(wp), intent(inout) :: field(:, :)
+    integer :: c
+
+    do c = 1, size(field, 2)
+      field(rows, c) = box(n + 1:n + size(rows))
+      n = n + size(rows)
+    end do
+  end subroutine unpack_rows
 
   !> Make room for n numbers; it stays for the next time.
   subroutine make_room(box, n)

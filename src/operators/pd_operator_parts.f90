@@ -37,8 +37,27 @@ contains
       ends = operators%domain%rows_of(k)
       call operators%domain%meet(k, operators%needed_rows(ends(1), ends(2)), mine)
     end do
+    call tell_inner_from_outer(operators)
     call operators%storage%keep(operators%domain%kept(operators%n))
   end subroutine divide_domain
+
+  !> Which blocks need rows of other ranks.
+  pure subroutine tell_inner_from_outer(operators)
+    class(operators_t), intent(inout) :: operators
+    logical, allocatable :: needs_others(:)
+    integer :: block, k
+
+    associate (blocks => operators%domain%blocks)
+      allocate (needs_others(blocks%count))
+      do block = 1, blocks%count
+        associate (rows => operators%reached_rows(blocks%lo(block), blocks%hi(block)))
+          needs_others(block) = rows(1) < blocks%first .or. rows(2) > blocks%last
+        end associate
+      end do
+    end associate
+    operators%domain%inner = pack([(k, k=1, size(needs_others))], .not. needs_others)
+    operators%domain%outer = pack([(k, k=1, size(needs_others))], needs_others)
+  end subroutine tell_inner_from_outer
 
   !> The same of operators that are set up: what is kept of other rows is zero, but for bonds and
   !> moments.

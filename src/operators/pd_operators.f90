@@ -15,6 +15,8 @@
 !>   hand_over_block(lo, hi, h, p)       for every block; takes P, keeps A
 !>   share()                             the sums can read A
 !>   force_block(lo, hi, u, f)           for every block
+!> Where ranks share the body, take_in and share wait for the rows of others. In their other form
+!> the blocks `domain%inner` go between begin_ and finish_, and `domain%outer` afterwards.
 !> Realisations: `pd_bond_list` for any points, `pd_balanced_list` off lattices, `pd_lattice` on
 !> them; set-up chooses. Each provides the sums G, D, Z and S. Where its weights leave out the
 !> volume of the neighbour, fields are first multiplied by its share. Families: see `pd_sight`.
@@ -23,9 +25,9 @@ module pd_operators
   use pd_blocks, only: blocks_t
   use pd_domain, only: domain_t
   use pd_flow, only: flow_t
-  use pd_kinds, only: block_sum, i8, n_block, wp
+  use pd_kinds, only: i8, n_block, wp
   use pd_mirror, only: mirror_t
-  use pd_operator_rows, only: control_stiffness, mean_displacement, stress_times_k_inverse, &
+  use pd_operator_rows, only: control_stiffness, stress_times_k_inverse, &
     subtract_affine_control, times_k_inverse, weigh_rows
   use pd_relaxing, only: relaxing_t, springs_t
   use pd_storage, only: storage_t
@@ -54,16 +56,16 @@ module pd_operators
     real(wp), allocatable :: weighed(:, :)                !! share u (n,2) [m]
     real(wp), allocatable :: pull(:, :)                   !! share c u, which Z reads (n,2) [N/m^5]
   contains
-    procedure :: take_in
+    procedure :: take_in, begin_taking_in, finish_taking_in
     procedure :: gradient_block
     procedure :: relax_block
     procedure :: hold_block
     procedure :: hand_over_block
-    procedure :: share
+    procedure :: share, begin_sharing, finish_sharing
     procedure :: force_block
-    procedure :: set_control, control_energy
+    procedure :: set_control
     procedure :: set_relaxing, relaxing_energy
-    procedure :: needed_rows
+    procedure :: needed_rows, reached_rows
     procedure, private :: residual_sums, weigh_in, weigh_block
     procedure(gradient_of), deferred :: gradient_sums_block
     procedure(divergence_of), deferred :: divergence_sums_block
@@ -157,23 +159,46 @@ contains
     real(wp), intent(inout), contiguous :: u(:, :)   !! (n,2) [m]; its halo is brought up to date
     real(wp), intent(in), optional :: moved(:)       !! along their normals (planes) [m]
 
-    call self%mirror%reflect_motion(u, moved)
-    call self%domain%halo%exchange(u)
-    call self%weigh_in(u)
-    call self%domain%make_room(self%n, 4, self%force_tensor)   ! rows without a point stay zero
+    call self%begin_taking_in(u, moved)
+    call self%finish_taking_in(u)
   end subroutine take_in
 
-  !> Keep u times the share of the points and, for Z, times the stiffness of the control.
-  subroutine weigh_in(self, u)
+  !> Make u readable for the sums of inner blocks.
+  subroutine begin_taking_in(self, u, moved)
     class(operators_t), intent(inout) :: self
+    real(wp), intent(inout), contiguous :: u(:, :)   !! (n,2) [m]
+    real(wp), intent(in), optional :: moved(:)       !! along their normals (planes) [m]
+
+    call self%mirror%reflect_motion(u, moved)
+    call self%domain%halo%begin(u)
+    call self%weigh_in([self%domain%blocks%first, self%domain%blocks%last], u)
+    call self%domain%make_room(self%n, 4, self%force_tensor)   ! rows without a point stay zero
+  end subroutine begin_taking_in
+
+  !> Make u readable for the sums of the others.
+  subroutine finish_taking_in(self, u)
+    class(operators_t), intent(inout) :: self
+    real(wp), intent(inout), contiguous :: u(:, :)   !! (n,2) [m]; its halo is brought up to date
+
+    call self%domain%halo%finish(u)
+    associate (known => self%domain%known, blocks => self%domain%blocks)
+      call self%weigh_in([known(1), blocks%first - 1], u)
+      call self%weigh_in([blocks%last + 1, known(2)], u)
+    end associate
+  end subroutine finish_taking_in
+
+  !> Keep u times the share of the points and, for Z, times the stiffness of the control.
+  subroutine weigh_in(self, rows, u)
+    class(operators_t), intent(inout) :: self
+    integer,  intent(in) :: rows(2)               !! first and last
     real(wp), intent(in), contiguous :: u(:, :)   !! (n,2) [m]
 
+    if (rows(2) < rows(1)) return
     if (self%weighs) then
       call self%domain%make_room(self%n, 2, self%weighed)
-      call weigh_rows(self%domain%known, self%share_of, u, self%weighed)
+      call weigh_rows(rows, self%share_of, u, self%weighed)
     end if
-    if (allocated(self%pull)) &
-      call weigh_rows(self%domain%known, self%share_of, u, self%pull, self%control)
+    if (allocated(self%pull)) call weigh_rows(rows, self%share_of, u, self%pull, self%control)
   end subroutine weigh_in
 
   !> A <- A times the share of the points, for rows lo to hi.
@@ -285,9 +310,31 @@ contains
   subroutine share(self)
     class(operators_t), intent(inout) :: self
 
-    call self%domain%halo%exchange(self%force_tensor)
-    if (allocated(self%relaxing)) call self%domain%halo%exchange(self%relaxing%pull)
+    call self%begin_sharing()
+    call self%finish_sharing()
   end subroutine share
+
+  !> Make A readable for the sums of inner blocks.
+  subroutine begin_sharing(self)
+    class(operators_t), intent(inout) :: self
+
+    if (allocated(self%relaxing)) then
+      call self%domain%halo%begin(self%force_tensor, self%relaxing%pull)
+    else
+      call self%domain%halo%begin(self%force_tensor)
+    end if
+  end subroutine begin_sharing
+
+  !> Make A readable for the sums of the others.
+  subroutine finish_sharing(self)
+    class(operators_t), intent(inout) :: self
+
+    if (allocated(self%relaxing)) then
+      call self%domain%halo%finish(self%force_tensor, self%relaxing%pull)
+    else
+      call self%domain%halo%finish(self%force_tensor)
+    end if
+  end subroutine finish_sharing
 
   !> Internal force density of rows lo to hi, the control included.
   pure subroutine force_block(self, lo, hi, u, f)
@@ -365,72 +412,6 @@ contains
     energy = blocks%total(parts)
   end subroutine relaxing_energy
 
-  !> Energy of the control: with constant c it has a potential, (1/2) sum V c sum omega V_j |z|^2,
-  !> which is the work of the control forces without the round-off of adding it up step by step. The
-  !> force is linear in u, so this is half of the force times u:
-  !>
-  !>   -(1/2) sum_i V_i (u_i - u_mean) . Z[u]_i - (1/2) sum_i V_i c_i H_i : H_i K_i
-  !>
-  !> The mean adds nothing, because the forces are in balance; with u alone digits would be lost.
-  subroutine control_energy(self, volume, u, h, energy)
-    class(operators_t), intent(in) :: self
-    real(wp), intent(in), contiguous :: volume(:)   !! V (n) [m^2]
-    real(wp), intent(in), contiguous :: u(:, :)     !! (n,2) [m]; as taken in
-    real(wp), intent(in), contiguous :: h(:, :)     !! H (n,4) xx xy yx yy
-    real(wp), intent(out) :: energy                 !! [J/m]; round-off does not make it negative
-    type(blocks_t) :: blocks
-    real(wp), allocatable :: parts(:), z(:, :)
-    real(wp) :: mean(2)
-    integer  :: block
-
-    energy = 0.0_wp
-    if (.not. allocated(self%control)) return
-    call self%domain%make_room(self%n, 2, z)
-    blocks = self%domain%blocks
-    allocate (parts(blocks%count))
-    mean = mean_displacement(blocks, volume, u)
-    !$omp parallel do schedule(static) default(none) private(block) &
-    !$omp shared(self, blocks, volume, u, h, mean, z, parts)
-    do block = 1, blocks%count
-      call self%control_sums_block(blocks%lo(block), blocks%hi(block), u, z)
-      parts(block) = control_energy_of_block(self, block, volume, u, h, mean, z)
-    end do
-    !$omp end parallel do
-    energy = blocks%total(parts)
-    if (energy < 0.0_wp) energy = 0.0_wp   ! not max: it would hide what is not a number
-  end subroutine control_energy
-
-  !> Energy of the control in one block.
-  pure real(wp) function control_energy_of_block(self, block, volume, u, h, mean, z) &
-    result(energy)
-    class(operators_t), intent(in) :: self
-    integer,            intent(in) :: block
-    real(wp), intent(in), contiguous :: volume(:), u(:, :), h(:, :), z(:, :)
-    real(wp), intent(in) :: mean(2)   !! of u [m]
-    real(wp) :: terms(n_block), determinant_of_k, kxx, kyy, kxy
-    integer  :: i, lo, hi
-
-    lo = self%domain%blocks%lo(block)
-    hi = self%domain%blocks%hi(block)
-    if (hi - lo + 1 < n_block) terms = 0.0_wp   ! sums go over whole blocks
-    associate (c => self%control, inverse => self%k_inverse)
-      !$omp simd simdlen(8) private(determinant_of_k, kxx, kyy, kxy)
-      do i = lo, hi
-        ! rows without a point have K^-1 = 0 and c = 0: the quotients stay finite
-        determinant_of_k = 1.0_wp &
-          / max(inverse(i, 1) * inverse(i, 2) - inverse(i, 3)**2, tiny(1.0_wp))
-        kxx = inverse(i, 2) * determinant_of_k
-        kyy = inverse(i, 1) * determinant_of_k
-        kxy = -inverse(i, 3) * determinant_of_k
-        terms(i - lo + 1) = -0.5_wp * volume(i) * ((u(i, 1) - mean(1)) * z(i, 1) &
-          + (u(i, 2) - mean(2)) * z(i, 2) + c(i) * (kxx * (h(i, 1)**2 + h(i, 3)**2) &
-          + kyy * (h(i, 2)**2 + h(i, 4)**2) + 2.0_wp * kxy * (h(i, 1) * h(i, 2) &
-          + h(i, 3) * h(i, 4))))
-      end do
-    end associate
-    energy = block_sum(terms)
-  end function control_energy_of_block
-
   !> Rows that the families of rows `first` to `last` read, ascending; none for no rows.
   pure function needed_rows(self, first, last) result(rows)
     class(operators_t), intent(in) :: self
@@ -439,5 +420,14 @@ contains
 
     rows = self%storage%around(first, last, self%domain%blocks%ends)
   end function needed_rows
+
+  !> The first and the last of them.
+  pure function reached_rows(self, first, last) result(ends)
+    class(operators_t), intent(in) :: self
+    integer, intent(in) :: first, last
+    integer :: ends(2)
+
+    ends = self%storage%reached(first, last, self%domain%blocks%ends)
+  end function reached_rows
 
 end module pd_operators

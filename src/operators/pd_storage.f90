@@ -33,7 +33,7 @@ module pd_storage
     procedure :: take_shares
     procedure :: point_at
     procedure :: first_point
-    procedure :: around
+    procedure :: around, reached
   end type storage_t
 
 contains
@@ -209,12 +209,24 @@ contains
     integer, intent(in)  :: first, last
     integer, intent(in)  :: ends(2)   !! first and last row that there is
     integer, allocatable :: rows(:)
-    integer :: far, i
+    integer :: reached(2), i
 
     allocate (rows(0))
     if (last < first) return
-    far = self%reach * (self%stride + 1)
-    rows = [(i, i=max(ends(1), first - far), min(ends(2), last + far))]
+    reached = self%reached(first, last, ends)
+    rows = [(i, i=reached(1), reached(2))]
   end function around
+
+  !> The first and the last of them.
+  pure function reached(self, first, last, ends) result(rows)
+    class(storage_t), intent(in) :: self
+    integer, intent(in) :: first, last
+    integer, intent(in) :: ends(2)   !! first and last row that there is
+    integer :: rows(2)
+
+    associate (far => self%reach * (self%stride + 1))
+      rows = [max(ends(1), first - far), min(ends(2), last + far)]
+    end associate
+  end function reached
 
 end module pd_storage

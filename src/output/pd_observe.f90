@@ -6,6 +6,7 @@
 module pd_observe
   use, intrinsic :: ieee_arithmetic, only: ieee_quiet_nan, ieee_value
   use pd_clock, only: clock_t
+  use pd_control_energy, only: control_energy
   use pd_kinds, only: block_sum, n_block, wp
   use pd_labels, only: label_t
   use pd_ledger, only: ledger_t
@@ -120,7 +121,7 @@ contains
     row%model => model
     row%state => state
     row%moment = moment
-    call model%operators%control_energy(model%points%volume, state%displacement, &
+    call control_energy(model%operators, model%points%volume, state%displacement, &
       state%displacement_gradient, row%control_energy)
     call model%operators%relaxing_energy(state%control_memory, held)
     row%control_energy = row%control_energy + held

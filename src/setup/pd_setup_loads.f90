@@ -60,6 +60,7 @@ contains
       if (size(input%boundaries(k)%traction) > 0) call check_density(input%boundaries(k)%name, &
         density(model%supports%items(k)%support%points), errors)
     end do
+    call model%supports%divide(model%blocks, model%operators%domain%kept(n))
     call model%supports%mark_prescribed(model%points%free)
   end subroutine set_up_supports
 
