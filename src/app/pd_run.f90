@@ -344,7 +344,7 @@ contains
     associate (model => run%model, state => run%state, ledger => run%ledger)
       if (run%checkpoint%history_rows > 0) then
         state%remembered = model%materials%remembered()
-        call state%scatter(model%shown%row, model%operators%n)
+        call state%scatter(model%shown%row(), model%operators%n)
         state%strength = model%strength
         call add_release(run%stages(run%clock%stage), state, model)
         call ledger%fit(model%blocks)

@@ -188,7 +188,7 @@ contains
     logical, allocatable :: inside(:)
     integer :: weaker
 
-    associate (row => model%operators%storage%row, rows => model%operators%n)
+    associate (row => model%operators%storage%row(), rows => model%operators%n)
       associate (strength => model%strength(row), here => model%materials%rows_of(k, rows))
         inside = model%body%boundary == 0 .and. here(row)
         if (.not. any(inside)) return   ! it is that of no body

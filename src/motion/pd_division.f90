@@ -8,7 +8,7 @@
 module pd_division
   use pd_model, only: model_t
   use pd_operator_parts, only: cuts, divide_operators, points_in_blocks
-  use pd_pages, only: forget_rows
+  use pd_pages, only: clear_marks, forget_rows
   use pd_ranks, only: ranks_t
   use pd_shared_rows, only: new_shared_rows, shared_rows_t
   use pd_state, only: state_t
@@ -121,7 +121,9 @@ contains
     logical, dimension(:), allocatable :: held, pushed   ! on the heap: one per row
     integer :: k
 
-    allocate (held(model%operators%n), pushed(model%operators%n), source=.false.)
+    allocate (held(model%operators%n), pushed(model%operators%n))
+    call clear_marks(held)
+    call clear_marks(pushed)
     do k = 1, size(model%supports%items)
       call model%supports%items(k)%support%mark_read(held, pushed)
     end do
@@ -130,7 +132,7 @@ contains
     end do
     model%shared = new_shared_rows(held, model%blocks)
     model%pushed = new_shared_rows(pushed, model%blocks)
-    held = .false.
+    call clear_marks(held)
     do k = 1, size(model%probes)
       held(model%probes(k)%row) = .true.
     end do

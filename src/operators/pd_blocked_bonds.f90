@@ -65,7 +65,7 @@ contains
     blocked%wx = blocked%weight * blocked%xi(:, 1)
     blocked%wy = blocked%weight * blocked%xi(:, 2)
     allocate (point(storage%rows), source=0)
-    point(storage%row) = [(i, i=1, storage%n)]
+    point(storage%row()) = [(i, i=1, storage%n)]
     do pass = 1, 2
       n = 0_i8
       n_rows = 0

@@ -29,6 +29,7 @@ module pd_lattice
   use pd_pages, only: clear_rows
   use pd_radial_sums, only: add_radial_sums, new_radial_sums, radial_sums_t
   use pd_ranks, only: ranks_t
+  use pd_runs, only: runs_t
   use pd_sight, only: sight_t
   use pd_storage, only: lattice_storage, line_start
   use pd_stretches, only: new_stretches
@@ -70,18 +71,17 @@ module pd_lattice
 contains
 
   !> Offsets, weights and moments. `ranks`: unless bonds are blocked, each has its own blocks only.
-  subroutine new_lattice_operators(horizon, spacing, place, volume, operators, sight, box, ranks)
+  subroutine new_lattice_operators(horizon, spacing, runs, operators, sight, box, ranks)
     type(horizon_t), intent(in) :: horizon
     real(wp),        intent(in) :: spacing       !! dx [m]
-    integer,         intent(in) :: place(:, :)   !! column and row of every point (n,2)
-    real(wp),        intent(in) :: volume(:)     !! V of every point (n) [m^2]
+    type(runs_t),    intent(in) :: runs          !! of the points
     type(lattice_operators_t), intent(out) :: operators
     type(sight_t), optional, intent(in) :: sight   !! absent: bonds cross air
     integer, optional, intent(in) :: box(:, :)   !! of `lattice_storage`
     type(ranks_t), optional, intent(in) :: ranks
     integer :: reach, i
 
-    operators%storage = lattice_storage(horizon, spacing, place, box)
+    operators%storage = lattice_storage(horizon, spacing, runs, box)
     operators%n = operators%storage%rows
     reach = int(horizon%delta / spacing * (1.0_wp + 1.0e-5_wp)) + 1
     call half_of_offsets(horizon, spacing, operators%storage%stride, reach, operators%shift, &
@@ -99,7 +99,7 @@ contains
       call divide_domain(operators, ranks, &
         points_in_blocks(operators%storage, operators%domain%blocks))
     end if
-    call operators%storage%take_shares(volume / spacing**2, operators%weighs, operators%share_of)
+    call operators%storage%take_shares(runs, spacing**2, operators%weighs, operators%share_of)
     operators%stretches = new_stretches(operators%domain%blocks, operators%share_of)
     call weigh(operators)
     if (operators%weighs) then

@@ -17,6 +17,7 @@ module pd_checkpoint
   use pd_points, only: points_t
   use pd_state, only: state_t
   use pd_step_limit, only: step_limit_t
+  use pd_storage, only: storage_t
   use pd_system, only: remove_file, rename_file
   implicit none
   private
@@ -45,7 +46,7 @@ module pd_checkpoint
   type, extends(field_visitor_t) :: writing_t
     type(hdf5_file_t)  :: file
     type(error_list_t) :: errors
-    integer, allocatable :: rows(:)     !! of the points, in their order
+    type(storage_t) :: storage          !! rows of the points
     type(blocks_t) :: blocks            !! of this rank
   contains
     procedure :: one_number => write_1
@@ -99,11 +100,11 @@ contains
   !> hand in.
   !>
   !> Errors: it cannot be written; the checkpoints so far are then as they were.
-  subroutine write_checkpoint(stem, checkpoint, state, rows, errors, blocks, points)
+  subroutine write_checkpoint(stem, checkpoint, state, storage, errors, blocks, points)
     character(*),       intent(in)    :: stem   !! output folder and name of the run
     type(checkpoint_t), intent(in)    :: checkpoint
     class(state_t),     intent(inout) :: state   !! visited, not changed
-    integer,            intent(in)    :: rows(:) !! of the state that belong to points, in order
+    type(storage_t),    intent(in)    :: storage !! rows of the state that belong to points
     type(error_list_t), intent(inout) :: errors
     type(blocks_t), optional, intent(in) :: blocks   !! of this rank; absent: all
     type(points_t), optional, intent(in) :: points   !! absent: they are in the checkpoint
@@ -114,7 +115,7 @@ contains
 
     before = errors%count()
     temporary = newest(stem)//'.tmp'
-    writer%rows = rows
+    writer%storage = storage
     if (present(blocks)) writer%blocks = blocks
     if (writer%blocks%ranks%mine == 0) then
       call create_file(writer%file, temporary, head_length, errors)
@@ -207,9 +208,9 @@ contains
     class(writing_t), intent(inout) :: self
     type(points_t),   intent(in)    :: points
 
-    call write_in_parts(self%file, '/position', self%blocks, self%rows, points%position, &
+    call write_in_parts(self%file, '/position', self%blocks, self%storage, points%position, &
       self%errors)
-    call write_in_parts(self%file, '/volume', self%blocks, self%rows, as_column(points%volume), &
+    call write_in_parts(self%file, '/volume', self%blocks, self%storage, as_column(points%volume), &
       self%errors)
   end subroutine write_points
 
@@ -220,10 +221,10 @@ contains
 
     if (.not. about%kept) return
     if (self%blocks%ranks%count > 1) then
-      call write_in_parts(self%file, place_of(about), self%blocks, self%rows, &
+      call write_in_parts(self%file, place_of(about), self%blocks, self%storage, &
         as_column(values), self%errors)
     else
-      call write_dataset(self%file, place_of(about), values(self%rows), self%errors)
+      call write_dataset(self%file, place_of(about), values(self%storage%row()), self%errors)
     end if
     if (self%blocks%ranks%mine == 0) call describe(self%file, about, self%errors)
   end subroutine write_1
@@ -235,9 +236,10 @@ contains
 
     if (.not. about%kept) return
     if (self%blocks%ranks%count > 1) then
-      call write_in_parts(self%file, place_of(about), self%blocks, self%rows, values, self%errors)
+      call write_in_parts(self%file, place_of(about), self%blocks, self%storage, values, &
+        self%errors)
     else
-      call write_dataset(self%file, place_of(about), values(self%rows, :), self%errors)
+      call write_dataset(self%file, place_of(about), values(self%storage%row(), :), self%errors)
     end if
     if (self%blocks%ranks%mine == 0) call describe(self%file, about, self%errors)
   end subroutine write_2

@@ -144,10 +144,10 @@ contains
     real(wp),            intent(out), contiguous :: values(:, :)
     integer :: i, ends(2)
 
-    ends = own_points(view%model%blocks, view%model%shown%row)
-    associate (h => view%state%displacement_gradient, row => view%model%shown%row)
+    ends = own_points(view%model%blocks, view%model%shown)
+    associate (h => view%state%displacement_gradient, rows => view%model%shown%rows_of(ends))
       do i = ends(1), ends(2)
-        values(1, i) = determinant(h(row(i), :))
+        values(1, i) = determinant(h(rows(i - ends(1) + 1), :))
       end do
     end associate
   end subroutine det_f
@@ -160,13 +160,15 @@ contains
     real(wp), allocatable :: z2(:)
     integer :: i, ends(2)
 
-    ends = own_points(view%model%blocks, view%model%shown%row)
-    associate (operators => view%model%operators, state => view%state)
+    ends = own_points(view%model%blocks, view%model%shown)
+    associate (operators => view%model%operators, state => view%state, &
+      rows => view%model%shown%rows_of(ends))
       allocate (z2(operators%n))
       call operators%zero_energy_squared(state%displacement, state%displacement_gradient, z2)
       do i = ends(1), ends(2)
-        values(1, i) = sqrt(z2(view%model%shown%row(i)) &
-          / operators%weight_sum(view%model%shown%row(i))) / view%model%delta
+        associate (row => rows(i - ends(1) + 1))
+          values(1, i) = sqrt(z2(row) / operators%weight_sum(row)) / view%model%delta
+        end associate
       end do
     end associate
   end subroutine zero_energy
@@ -176,12 +178,14 @@ contains
     type(model_t), intent(in) :: model
     real(wp), intent(in)  :: field(:, :)                    !! (rows,components)
     real(wp), intent(out), contiguous :: values(:, :)       !! (components,points)
+    integer, allocatable :: rows(:)
     integer :: i, ends(2)
 
-    ends = own_points(model%blocks, model%shown%row)
-    !$omp parallel do schedule(static) default(none) private(i) shared(model, values, field, ends)
+    ends = own_points(model%blocks, model%shown)
+    allocate (rows, source=model%shown%rows_of(ends))
+    !$omp parallel do schedule(static) default(none) private(i) shared(rows, values, field, ends)
     do i = ends(1), ends(2)
-      values(:, i) = field(model%shown%row(i), :)
+      values(:, i) = field(rows(i - ends(1) + 1), :)
     end do
     !$omp end parallel do
   end subroutine take

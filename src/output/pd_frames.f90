@@ -99,7 +99,7 @@ contains
       allocate (values(fields(i)%width(), model%shown%n))
       call fill_field(fields(i), model, state, values)
       if (model%blocks%ranks%count > 1) then
-        call put_parts(file, place_of(group, fields(i)), model%blocks, model%shown%row, values, &
+        call put_parts(file, place_of(group, fields(i)), model%blocks, model%shown, values, &
           errors)
       else
         call overwrite_rows(file, place_of(group, fields(i)), values, errors)

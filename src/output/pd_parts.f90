@@ -1,5 +1,5 @@
 !> Values of all points on their way to the disk, one rank after the other: rank 0 writes, and has
-!> room for those of one rank at a time.
+!> room for a part of those of one rank at a time.
 !>
 !> Every rank must come to these calls, also where the file is not good.
 module pd_parts
@@ -8,6 +8,7 @@ module pd_parts
   use pd_gather, only: points_of_rank
   use pd_hdf5, only: hdf5_file_t, overwrite_some_rows, reserve_dataset
   use pd_kinds, only: wp
+  use pd_storage, only: storage_t
   implicit none
   private
 
@@ -16,58 +17,62 @@ module pd_parts
 contains
 
   !> Write what each rank has of its points into an existing dataset.
-  subroutine put_parts(file, name, blocks, row, values, errors)
+  subroutine put_parts(file, name, blocks, storage, values, errors)
     type(hdf5_file_t),  intent(inout) :: file
     character(*),       intent(in)    :: name
     type(blocks_t),     intent(in)    :: blocks
-    integer,            intent(in)    :: row(:)          !! of every point, ascending
+    type(storage_t),    intent(in)    :: storage         !! rows of the points
     real(wp),           intent(in)    :: values(:, :)    !! (components,points)
     type(error_list_t), intent(inout) :: errors
+    integer, parameter :: most = 2**15   ! points at a time
     real(wp), allocatable :: part(:, :)
-    integer :: ends(2), k
+    integer :: ends(2), first, k, last
 
     do k = 0, blocks%ranks%count - 1
       if (k /= blocks%ranks%mine .and. blocks%ranks%mine > 0) cycle
-      ends = points_of_rank(blocks, row, k)
-      allocate (part(size(values, 1), max(0, ends(2) - ends(1) + 1)))
-      if (k == blocks%ranks%mine) part = values(:, ends(1):ends(2))
-      call blocks%ranks%hand_over(k, part)
-      if (blocks%ranks%mine == 0) call overwrite_some_rows(file, name, ends(1), part, errors)
-      deallocate (part)
+      ends = points_of_rank(blocks, storage, k)
+      do first = ends(1), ends(2), most
+        last = min(ends(2), first + most - 1)
+        part = values(:, first:last)   ! those of another rank: anything, until it hands them over
+        call blocks%ranks%hand_over(k, part)
+        if (blocks%ranks%mine == 0) call overwrite_some_rows(file, name, first, part, errors)
+      end do
     end do
   end subroutine put_parts
 
   !> The same of a field.
-  subroutine put_field(file, name, blocks, row, field, errors)
+  subroutine put_field(file, name, blocks, storage, field, errors)
     type(hdf5_file_t),  intent(inout) :: file
     character(*),       intent(in)    :: name
     type(blocks_t),     intent(in)    :: blocks
-    integer,            intent(in)    :: row(:)        !! of every point, ascending
+    type(storage_t),    intent(in)    :: storage       !! rows of the points
     real(wp),           intent(in)    :: field(:, :)   !! (rows,components)
     type(error_list_t), intent(inout) :: errors
     real(wp), allocatable :: values(:, :)
     integer :: ends(2), i
 
-    allocate (values(size(field, 2), size(row)))   ! takes memory where it is written
-    ends = points_of_rank(blocks, row, blocks%ranks%mine)
-    do i = ends(1), ends(2)
-      values(:, i) = field(row(i), :)
-    end do
-    call put_parts(file, name, blocks, row, values, errors)
+    allocate (values(size(field, 2), storage%n))   ! takes memory where it is written
+    ends = points_of_rank(blocks, storage, blocks%ranks%mine)
+    associate (rows => storage%rows_of(ends))
+      do i = ends(1), ends(2)
+        values(:, i) = field(rows(i - ends(1) + 1), :)
+      end do
+    end associate
+    call put_parts(file, name, blocks, storage, values, errors)
   end subroutine put_field
 
   !> Write a field at the points into a new dataset.
-  subroutine write_in_parts(file, name, blocks, row, field, errors)
+  subroutine write_in_parts(file, name, blocks, storage, field, errors)
     type(hdf5_file_t),  intent(inout) :: file
     character(*),       intent(in)    :: name
     type(blocks_t),     intent(in)    :: blocks
-    integer,            intent(in)    :: row(:)        !! of every point, ascending
+    type(storage_t),    intent(in)    :: storage       !! rows of the points
     real(wp),           intent(in)    :: field(:, :)   !! (rows,components)
     type(error_list_t), intent(inout) :: errors
 
     if (blocks%ranks%mine == 0) &
-      call reserve_values(file, name, [size(row), size(field, 2)], errors)
-    call put_field(file, name, blocks, row, field, errors)
+      call reserve_values(file, name, [storage%n, size(field, 2)], errors)
+    call put_field(file, name, blocks, storage, field, errors)
   end subroutine write_in_parts
 
   !> A dataset for the values of points; with one component of rank 1.

@@ -22,11 +22,11 @@ contains
     type(error_list_t), intent(inout) :: errors
     type(hdf5_file_t) :: file
 
-    associate (blocks => model%blocks, row => model%shown%row)
+    associate (blocks => model%blocks, shown => model%shown)
       if (blocks%ranks%mine == 0) call open_file(file, path, .true., errors)
-      call put_field(file, '/points/position', blocks, row, model%points%position, errors)
-      call put_field(file, '/points/volume', blocks, row, as_column(model%points%volume), errors)
-      if (with_strength) call put_field(file, '/points/yield_stress', blocks, row, &
+      call put_field(file, '/points/position', blocks, shown, model%points%position, errors)
+      call put_field(file, '/points/volume', blocks, shown, as_column(model%points%volume), errors)
+      if (with_strength) call put_field(file, '/points/yield_stress', blocks, shown, &
         as_column(model%strength), errors)
       if (blocks%ranks%mine == 0) call close_file(file, errors)
     end associate

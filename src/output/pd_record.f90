@@ -166,12 +166,12 @@ contains
       if (description%in_parts) then
         allocate (description%yield_stress(0))
       else
-        description%yield_stress = model%strength(model%shown%row)
+        description%yield_stress = model%strength(model%shown%row())
       end if
       if (model%whole%n > 0) description%yield_stress = model%shown_strength
     end if
     if (allocated(model%materials%stiffness)) description%youngs_modulus = &
-      model%materials%youngs_modulus_of(model%shown%row)
+      model%materials%youngs_modulus_of(model%shown%row())
     allocate (character(64) :: description%boundary_names(size(model%supports%items)))
     do k = 1, size(model%supports%items)
       description%boundary_names(k) = model%supports%items(k)%support%name
@@ -193,8 +193,8 @@ contains
       volume = model%whole%volume
       boundary = model%whole%boundary
     else
-      position = model%points%position(model%shown%row, :)
-      volume = model%points%volume(model%shown%row)
+      position = model%points%position(model%shown%row(), :)
+      volume = model%points%volume(model%shown%row())
       boundary = model%body%boundary
     end if
   end subroutine points_of

@@ -93,11 +93,11 @@ contains
     checkpoint%changes(:, :size(model%supports%items)) = changes_of(model%supports)
     if (model%blocks%ranks%count > 1 .and. model%whole%n == 0) then
       checkpoint%boundary = model%body%boundary
-      call write_checkpoint(record%stem, checkpoint, state, model%shown%row, errors, model%blocks, &
+      call write_checkpoint(record%stem, checkpoint, state, model%shown, errors, model%blocks, &
         model%points)
     else
       call points_of(model, checkpoint%position, checkpoint%volume, checkpoint%boundary)
-      call write_checkpoint(record%stem, checkpoint, state, model%shown%row, errors, model%blocks)
+      call write_checkpoint(record%stem, checkpoint, state, model%shown, errors, model%blocks)
     end if
   end subroutine put_checkpoint
 

@@ -12,6 +12,7 @@ module pd_setup
   use pd_lattice, only: lattice_operators_t, new_lattice_operators
   use pd_model, only: model_t
   use pd_ranks, only: ranks_t
+  use pd_runs, only: runs_of
   use pd_setup_gradients, only: check_gradients
   use pd_setup_gravity, only: set_up_gravity
   use pd_setup_initial_stress, only: set_up_initial_stress
@@ -125,8 +126,8 @@ contains
 
     if (allocated(model%body%place) .and. form /= 'list') then
       allocate (lattice)
-      call new_lattice_operators(horizon, model%spacing, model%body%place, model%body%volume, &
-        lattice, sight, model%body%box, ranks)
+      call new_lattice_operators(horizon, model%spacing, runs_of(model%body%place, &
+        model%body%volume), lattice, sight, model%body%box, ranks)
       call move_alloc(lattice, model%operators)
     else
       allocate (list)

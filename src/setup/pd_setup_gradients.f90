@@ -61,7 +61,7 @@ contains
 
     stiffness = 1.0_wp
     if (allocated(model%materials%stiffness)) &
-      stiffness = model%materials%stiffness(model%operators%storage%row)
+      stiffness = model%materials%stiffness(model%operators%storage%row())
   end function stiffness_of_points
 
   !> Points at which a gradient has left no stiffness or strength.

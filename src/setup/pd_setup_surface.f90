@@ -61,7 +61,7 @@ contains
         call find_bare_edges(input, stage, model, edges)
       end if
       ! N_i is felt where families touch cut ones
-      call find_edge_weights(edges, body%position, vectors(model%operators%storage%row, :), &
+      call find_edge_weights(edges, body%position, vectors(model%operators%storage%row(), :), &
         surface%free, 2.0_wp * model%delta + model%spacing, model%spacing, surface%weights)
     end associate
   end subroutine find_surface

@@ -10,7 +10,7 @@ module pd_pages
   implicit none
   private
 
-  public :: forget_rows, clear_rows
+  public :: forget_rows, clear_rows, clear_marks
 
   interface forget_rows
     procedure :: forget_numbers
@@ -41,8 +41,11 @@ contains
     real(wp), intent(inout), contiguous, target :: field(:)   !! (rows)
     integer,  intent(in) :: kept(2)                           !! first and last row
 
-    if (kept(1) > 1) call forget(field(:kept(1) - 1))
-    if (kept(2) < size(field)) call forget(field(max(1, kept(2) + 1):))
+    integer :: ignored(2)
+
+    if (kept(1) > 1) call forget(c_loc(field), min(size(field), kept(1) - 1), 8, ignored)
+    if (kept(2) < size(field)) call forget(c_loc(field(max(1, kept(2) + 1))), &
+      size(field) - max(0, kept(2)), 8, ignored)
   end subroutine forget_numbers
 
   !> The same of a field with components.
@@ -82,40 +85,51 @@ contains
     real(wp), intent(inout), contiguous, target :: numbers(:)
     integer :: whole(2)
 
-    call forget(numbers, whole)
+    if (size(numbers) == 0) return
+    call forget(c_loc(numbers), size(numbers), 8, whole)
     numbers(:whole(1) - 1) = 0.0_wp
     numbers(whole(2) + 1:) = 0.0_wp
   end subroutine clear
 
-  !> Give back the pages that hold nothing but these numbers.
-  subroutine forget(numbers, given_back)
-    real(wp), intent(in), contiguous, target :: numbers(:)
-    integer,  intent(out), optional :: given_back(2)   !! first and last of these numbers
+  !> Make no row a marked one: marks take memory where they are set.
+  subroutine clear_marks(marks)
+    logical, intent(out), contiguous, target :: marks(:)   !! (rows)
+    integer :: whole(2)
+
+    whole = [size(marks) + 1, size(marks)]
+    if (size(marks) > 0) call forget(c_loc(marks), size(marks), storage_size(marks) / 8, whole)
+    if (whole(1) <= size(marks)) then
+      ! what a page of zeros says is for the compiler to know
+      if (marks(whole(1))) whole = [size(marks) + 1, size(marks)]
+    end if
+    marks(:whole(1) - 1) = .false.
+    marks(whole(2) + 1:) = .false.
+  end subroutine clear_marks
+
+  !> Give back the pages that hold nothing but some numbers.
+  subroutine forget(address, count, bytes, given_back)
+    type(c_ptr), intent(in)  :: address         !! of the first number
+    integer,     intent(in)  :: count, bytes    !! numbers, and bytes of each
+    integer,     intent(out) :: given_back(2)   !! first and last of these numbers
     integer(c_int), parameter :: dont_need = 4_c_int         ! MADV_DONTNEED of Linux
     integer(c_int), parameter :: no_huge_pages = 15_c_int    ! MADV_NOHUGEPAGE
-    integer(c_intptr_t) :: start, finish, page
-    type(c_ptr)    :: address
+    integer(c_intptr_t) :: before, start, finish, page, width
     integer(c_int) :: failed
-    integer(c_intptr_t) :: before
     logical :: linux
 
-    if (present(given_back)) given_back = [size(numbers) + 1, size(numbers)]
-    if (size(numbers) == 0) return
+    given_back = [count + 1, count]
     page = int(c_getpagesize(), c_intptr_t)
-    address = c_loc(numbers)
-    start = transfer(address, start)
-    finish = start + 8_c_intptr_t * size(numbers, kind=c_intptr_t)
-    before = start
-    start = page * ((start + page - 1) / page)
-    finish = page * (finish / page)
+    width = int(bytes, c_intptr_t)
+    before = transfer(address, before)
+    start = page * ((before + page - 1) / page)
+    finish = page * ((before + width * int(count, c_intptr_t)) / page)
     if (finish <= start) return
     inquire (file='/proc/version', exist=linux)
     if (.not. linux) return
     ! a huge page would take 2 MiB where one row is written
     failed = c_madvise(start, int(finish - start, c_size_t), no_huge_pages)
     failed = c_madvise(start, int(finish - start, c_size_t), dont_need)
-    if (present(given_back) .and. failed == 0) &
-      given_back = int([start - before, finish - before] / 8_c_intptr_t) + [1, 0]
+    if (failed == 0) given_back = int([start - before, finish - before] / width) + [1, 0]
   end subroutine forget
 
 end module pd_pages
