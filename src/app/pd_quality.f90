@@ -107,19 +107,19 @@ contains
     end associate
   end subroutine find_quality
 
-  !> Tell the quality in a line, and write it into the result file: at the end, or as it was at the
-  !> last row of a run that has failed, whose state has no zero-energy part to speak of. Where there
-  !> were warnings, tell what to read.
-  subroutine tell_quality(run, failed, errors)
+  !> Tell the quality in a line, and write it into the result file: that of the present state, or as
+  !> it was at the last row of a run that has failed, whose state has no zero-energy part to speak
+  !> of. Where there were warnings, tell what to read.
+  subroutine tell_quality(run, when, failed, errors)
     type(run_t),        intent(inout) :: run
+    character(*),       intent(in)    :: when     !! this is, in words
     logical,            intent(in)    :: failed
     type(error_list_t), intent(inout) :: errors
     type(quality_t) :: quality
     character(:), allocatable :: line
 
     call find_quality(run, failed, quality)
-    line = 'quality at the end: '
-    if (failed) line = 'quality when it was looked at last: '
+    line = 'quality '//when//': '
     call append('energy error', quality%energy_error, percent=.true.)
     call append('kinetic over internal energy', quality%kinetic_ratio, percent=.true.)
     call append('reactions apart by', quality%reaction_gap, percent=.true.)
