@@ -10,6 +10,7 @@ module pd_quality
   use pd_errors, only: error_list_t
   use pd_kinds, only: wp
   use pd_observe, only: imbalance, over_work
+  use pd_platens, only: press_along
   use pd_record, only: record_line, record_quality
   use pd_run, only: run_t
   use pd_text, only: short_number
@@ -36,7 +37,7 @@ contains
   end function kinetic_ratio
 
   !> Sum of the normal forces of the platens over the largest of either so far (which is kept); 0
-  !> where something else acts on the body too, or nothing does.
+  !> where something else acts on the body too, nothing does, or they only slide past each other.
   subroutine find_reaction_gap(run, gap)
     type(run_t), intent(inout) :: run
     real(wp),    intent(out)   :: gap
@@ -45,7 +46,7 @@ contains
 
     gap = 0.0_wp
     associate (platens => run%model%platens, items => run%model%supports%items)
-      if (platens%axis == 0 .or. run%model%loads%count() > 0) return
+      if (.not. press_along(platens) .or. run%model%loads%count() > 0) return
       do k = 1, size(items)
         if (allocated(items(k)%support%load_kind)) return
       end do
@@ -97,7 +98,7 @@ contains
         if (run%model%damping > 0.0_wp) quality%damping_share = seen%value('damping_share')
       end if
       quality%reaction_gap = nan
-      if (run%model%platens%axis > 0 .and. run%model%loads%count() == 0) &
+      if (press_along(run%model%platens) .and. run%model%loads%count() == 0) &
         call find_reaction_gap(run, quality%reaction_gap)
       quality%control_share = nan
       if (run%input%stabilisation%method /= 'none') &
