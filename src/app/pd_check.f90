@@ -6,6 +6,7 @@ module pd_check
   use pd_division, only: share_t, shares, traffic, traffic_t
   use pd_doubt_list, only: write_doubt_table
   use pd_errors, only: error_list_t, exit_command_line, exit_file, exit_input, exit_ok, outcome_t
+  use pd_files, only: meant_path
   use pd_input, only: print_input
   use pd_input_reference, only: write_input_reference, write_input_reference_json
   use pd_input_types, only: all_keys
@@ -93,7 +94,8 @@ contains
       call outcome%end_with(exit_ok)
       return
     end if
-    if (points_path /= '') call write_points(points_path, run%input, run%model, errors)
+    if (points_path /= '') &
+      call write_points(meant_path(points_path), run%input, run%model, errors)
     call outcome%end_if_any(errors, exit_file)
     if (outcome%done) return
     call find_highest_frequency(run%model)

@@ -10,6 +10,7 @@ module pd_quality
   use pd_errors, only: error_list_t
   use pd_kinds, only: wp
   use pd_observe, only: imbalance, over_work
+  use pd_platens, only: press_along
   use pd_record, only: record_line, record_quality
   use pd_run, only: run_t
   use pd_text, only: short_number
@@ -36,7 +37,7 @@ contains
   end function kinetic_ratio
 
   !> Sum of the normal forces of the platens over the largest of either so far (which is kept); 0
-  !> where something else acts on the body too, or nothing does.
+  !> where something else acts on the body too, nothing does, or they only slide past each other.
   subroutine find_reaction_gap(run, gap)
     type(run_t), intent(inout) :: run
     real(wp),    intent(out)   :: gap
@@ -45,7 +46,7 @@ contains
 
     gap = 0.0_wp
     associate (platens => run%model%platens, items => run%model%supports%items)
-      if (platens%axis == 0 .or. run%model%loads%count() > 0) return
+      if (.not. press_along(platens) .or. run%model%loads%count() > 0) return
       do k = 1, size(items)
         if (allocated(items(k)%support%load_kind)) return
       end do
@@ -97,7 +98,7 @@ contains
         if (run%model%damping > 0.0_wp) quality%damping_share = seen%value('damping_share')
       end if
       quality%reaction_gap = nan
-      if (run%model%platens%axis > 0 .and. run%model%loads%count() == 0) &
+      if (press_along(run%model%platens) .and. run%model%loads%count() == 0) &
         call find_reaction_gap(run, quality%reaction_gap)
       quality%control_share = nan
       if (run%input%stabilisation%method /= 'none') &
@@ -107,19 +108,19 @@ contains
     end associate
   end subroutine find_quality
 
-  !> Tell the quality in a line, and write it into the result file: at the end, or as it was at the
-  !> last row of a run that has failed, whose state has no zero-energy part to speak of. Where there
-  !> were warnings, tell what to read.
-  subroutine tell_quality(run, failed, errors)
+  !> Tell the quality in a line, and write it into the result file: that of the present state, or as
+  !> it was at the last row of a run that has failed, whose state has no zero-energy part to speak
+  !> of. Where there were warnings, tell what to read.
+  subroutine tell_quality(run, when, failed, errors)
     type(run_t),        intent(inout) :: run
+    character(*),       intent(in)    :: when     !! this is, in words
     logical,            intent(in)    :: failed
     type(error_list_t), intent(inout) :: errors
     type(quality_t) :: quality
     character(:), allocatable :: line
 
     call find_quality(run, failed, quality)
-    line = 'quality at the end: '
-    if (failed) line = 'quality when it was looked at last: '
+    line = 'quality '//when//': '
     call append('energy error', quality%energy_error, percent=.true.)
     call append('kinetic over internal energy', quality%kinetic_ratio, percent=.true.)
     call append('reactions apart by', quality%reaction_gap, percent=.true.)

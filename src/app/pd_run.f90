@@ -11,7 +11,7 @@ module pd_run
   use pd_doubt_list, only: doubts_t
   use pd_earlier_run, only: largest_reaction_before, load_doubts, look_for_end, results_in_the_way
   use pd_errors, only: error_list_t, exit_file, exit_input, exit_model, exit_ok, outcome_t
-  use pd_files, only: prepare_folder
+  use pd_files, only: meant_path, prepare_folder
   use pd_history_columns, only: history_columns
   use pd_increment, only: begin_increments, increments_t, new_increments
   use pd_input, only: read_input
@@ -91,6 +91,7 @@ contains
     call outcome%end_if_any(errors, exit_input)
     if (outcome%done) return
     if (options%output_dir /= '') run%input%run%output_dir = options%output_dir
+    run%input%run%output_dir = meant_path(run%input%run%output_dir)
     call keep_inputs(stem_of(run), run%input, errors)
     call outcome%end_if_any(errors, exit_file)
     if (.not. (options%check .or. outcome%done)) call look_for_earlier_run(options, run, outcome)

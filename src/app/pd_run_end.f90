@@ -1,27 +1,33 @@
-!> How a run ends: complete, at the limit of its loads, or with a failure.
+!> How a run ends: complete, at the limit of its loads, by a signal, or with a failure.
 module pd_run_end
   use, intrinsic :: ieee_arithmetic, only: ieee_is_finite
   use, intrinsic :: iso_fortran_env, only: error_unit, int64
-  use pd_errors, only: error_list_t, exit_calculation, exit_file, outcome_t
+  use pd_agreement, only: any_rank, signal_of
+  use pd_errors, only: error_list_t, exit_calculation, exit_file, exit_interrupted, &
+    exit_terminated, outcome_t
+  use pd_increment, only: take_back
   use pd_kinds, only: wp
   use pd_lock, only: release_lock
   use pd_quality, only: tell_quality
   use pd_record, only: close_record, observe_state, record_failure, record_frame, record_line, &
     record_row
-  use pd_record_checkpoint, only: save_last_checkpoint
+  use pd_record_checkpoint, only: save_checkpoint, save_last_checkpoint
   use pd_run, only: run_t
+  use pd_system, only: sigint, signal_name
   use pd_text, only: coordinate_text, integer_text, short_number
   use pd_timing, only: kernel_names
   use pd_unbalanced, only: loads_at
   implicit none
   private
 
-  public :: finish_run, end_without_equilibrium, fail, fastest_row, remedy, close_run
+  public :: finish_run, end_without_equilibrium, stop_by_signal, tell_signal
+  public :: fail, fastest_row, remedy, close_run
 
 contains
 
-  !> No equilibrium was found. Under loads that is their limit: the last equilibrium is written, and
-  !> the run is to be finished. Without loads, or from the start, it is a failure.
+  !> No equilibrium was found, because of a signal, or none is there. Under loads that is their
+  !> limit: the last equilibrium is written, and the run is to be finished. Without loads, or from
+  !> the start, it is a failure.
   subroutine end_without_equilibrium(run, outcome)
     type(run_t),     intent(inout) :: run
     type(outcome_t), intent(inout) :: outcome
@@ -29,6 +35,10 @@ contains
     character(:), allocatable :: tried, loads
     integer :: row
 
+    if (run%increments%last%stopped) then
+      call stop_by_signal('goes on from the checkpoint', run, outcome)
+      return
+    end if
     associate (last => run%increments%last, t => run%clock%time())
       tried = short_number(t + run%clock%time_step)//' s, where '
       if (last%failed_row > 0) then
@@ -46,6 +56,7 @@ contains
         call fail('no equilibrium was found at '//tried, row, run, outcome)
         return
       end if
+      call take_back(t, run%model, run%state, run%increments)
       if (run%record%moment%step /= run%clock%step) then
         call run%ledger%note_work(run%model%blocks)
         call observe_state(run%model, run%state, run%ledger, run%clock, run%record)
@@ -64,6 +75,39 @@ contains
     call outcome%end_if_any(errors, exit_file)
     call outcome%agree(run%ranks)
   end subroutine end_without_equilibrium
+
+  !> A signal has come while a state was looked for that is none to go on from: keep the one before
+  !> it, which is that of the run again.
+  subroutine stop_by_signal(next, run, outcome)
+    character(*),    intent(in)    :: next      !! what --restart does
+    type(run_t),     intent(inout) :: run
+    type(outcome_t), intent(inout) :: outcome
+    type(error_list_t) :: errors
+    integer :: signal
+
+    signal = signal_of(run%ranks)
+    call save_checkpoint(run%model, run%state, run%ledger, run%clock, run%limit, run%record, errors)
+    if (.not. any_rank(run%ranks, errors%count() > 0)) then
+      call observe_state(run%model, run%state, run%ledger, run%clock, run%record)
+      call tell_signal(signal, next, run, errors)
+    end if
+    call outcome%end_if_any(errors, exit_file)
+    call outcome%agree(run%ranks)
+    if (.not. outcome%done) &
+      call outcome%end_with(merge(exit_interrupted, exit_terminated, signal == sigint))
+  end subroutine stop_by_signal
+
+  !> Last lines of the log of a run that is stopped; a checkpoint has been written.
+  subroutine tell_signal(signal, next, run, errors)
+    integer,            intent(in)    :: signal
+    character(*),       intent(in)    :: next     !! what --restart does
+    type(run_t),        intent(inout) :: run
+    type(error_list_t), intent(inout) :: errors
+
+    call tell_quality(run, 'so far', .false., errors)
+    call record_line(run%record, 'stopped by a signal ('//signal_name(signal)//'); --restart '// &
+      next, errors)
+  end subroutine tell_signal
 
   !> How far the present stage has come; '' without stages.
   pure function stage_in_words(run) result(text)
@@ -149,7 +193,7 @@ contains
     call record_failure(run%model, run%state, run%clock, run%record, file_errors)
     call record_line(run%record, 'the calculation failed: '//reason//'; '//where//'; '// &
       state_at(row, run), file_errors)
-    call tell_quality(run, .true., file_errors)
+    call tell_quality(run, 'when it was looked at last', .true., file_errors)
     call file_errors%print(error_unit)
     call errors%add('the calculation failed: '//reason//'; '//state_at(row, run)//'; the '// &
       'frames and rows before this step are good; '//remedy(run)//' may help', where)
@@ -162,7 +206,7 @@ contains
     type(outcome_t), intent(inout) :: outcome
     type(error_list_t) :: errors
 
-    call tell_quality(run, .false., errors)
+    call tell_quality(run, 'at the end', .false., errors)
     call tell_where_time_went(run, errors)
     call record_line(run%record, 'results in '//run%record%stem//'.h5, .xdmf, _history.csv', errors)
     call close_record(run%record, errors)

@@ -7,12 +7,12 @@ module pd_run_steps
   use pd_errors, only: error_list_t, exit_file, exit_interrupted, exit_terminated, outcome_t
   use pd_kinds, only: wp
   use pd_progress, only: progress_due
-  use pd_record, only: observe_state, record_frame, record_line, record_progress, record_row
+  use pd_record, only: observe_state, record_frame, record_progress, record_row
   use pd_record_checkpoint, only: save_checkpoint
   use pd_run, only: run_t
-  use pd_run_end, only: fail
+  use pd_run_end, only: fail, tell_signal
   use pd_state, only: n_news
-  use pd_system, only: pending_signal, sigint, signal_name
+  use pd_system, only: pending_signal, sigint
   use pd_timing, only: kernel_history
   implicit none
   private
@@ -34,7 +34,7 @@ contains
   !> What is due after a step. Clocks, signals and trouble with files differ from rank to rank: what
   !> one of them finds due is due. In a motion they tell each other what they find before a step
   !> while that goes on, and it takes effect after the next one; at once in the first and the last
-  !> step, and at equilibrium, where steps are long.
+  !> step, and at equilibrium, where steps are long and look for signals themselves.
   type(due_t) function due_after_step(step, run) result(due)
     integer,     intent(in)    :: step
     type(run_t), intent(inout) :: run
@@ -100,17 +100,16 @@ contains
     call run%timing%lap(kernel_history)
     call write_frames_and_checkpoint(due, run, errors)
     if (due%stop .and. run%trouble%count() > 0) errors = run%trouble
-    if (due%stop .and. errors%count() == 0) call record_line(run%record, &
-      'stopped by a signal ('//signal_name(due%signal)// &
-      '); --restart goes on from the checkpoint', errors)
     in_trouble = errors%count() > 0
     if (due%anything .or. due%progress) in_trouble = any_rank(run%ranks, in_trouble)
+    if (due%stop .and. .not. in_trouble) &
+      call tell_signal(due%signal, 'goes on from the checkpoint', run, errors)
     if (in_trouble .and. .not. due%whole) then
       run%trouble = errors   ! one step more, whose state can be kept
       return
     end if
     call outcome%end_if_any(errors, exit_file)
-    if (in_trouble) call outcome%agree(run%ranks)
+    if (in_trouble .or. due%stop) call outcome%agree(run%ranks)
     if (due%stop .and. .not. outcome%done) &
       call outcome%end_with(merge(exit_interrupted, exit_terminated, due%signal == sigint))
   end subroutine write_what_is_due

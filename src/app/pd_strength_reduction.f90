@@ -6,17 +6,15 @@
 !> Source: doc/theory.md, section 6.
 module pd_strength_reduction
   use pd_agreement, only: signal_of
-  use pd_errors, only: error_list_t, exit_file, exit_interrupted, exit_terminated, outcome_t
+  use pd_errors, only: error_list_t, exit_file, outcome_t
   use pd_forces, only: forces
   use pd_kinds, only: wp
   use pd_materials, only: material_t
   use pd_record, only: record_frame, record_line, record_tries
-  use pd_record_checkpoint, only: save_checkpoint
   use pd_relaxation, only: keep_start, relax, relaxed_t, return_to_start
   use pd_run, only: run_t
-  use pd_run_end, only: fail, fastest_row
+  use pd_run_end, only: fail, fastest_row, stop_by_signal
   use pd_state, only: state_t
-  use pd_system, only: sigint, signal_name
   use pd_text, only: integer_text, short_number
   use pd_tries, only: tries_t
   implicit none
@@ -45,15 +43,17 @@ contains
     associate (given => run%input%strength_reduction(1))
       call try(given%first, start, unreduced, run, tries, errors)
       held = run%state
-      if (.not. tries%held(1)) then
-        call fail('the body does not bear the first factor of strength_reduction', &
-          fastest_row(run), run, outcome)
-        return
+      if (signal_of(run%ranks) == 0) then
+        if (.not. tries%held(1)) then
+          call fail('the body does not bear the first factor of strength_reduction', &
+            fastest_row(run), run, outcome)
+          return
+        end if
+        call try(given%last, start, unreduced, run, tries, errors)
       end if
-      if (signal_of(run%ranks) == 0) call try(given%last, start, unreduced, run, tries, errors)
       moving = run%state
-      do while (signal_of(run%ranks) == 0 .and. .not. tries%held(2) &
-        .and. tries%most() - tries%least() > given%tolerance)
+      do while (signal_of(run%ranks) == 0)
+        if (tries%held(2) .or. tries%most() - tries%least() <= given%tolerance) exit
         call try(0.5_wp * (tries%least() + tries%most()), start, unreduced, run, tries, errors)
         if (tries%held(tries%n)) held = run%state
         if (.not. tries%held(tries%n)) moving = run%state
@@ -61,7 +61,7 @@ contains
     end associate
     if (signal_of(run%ranks) /= 0) then
       run%state = start
-      call stop_by_signal(run, outcome, errors)
+      call stop_by_signal('looks for the factor of safety anew', run, outcome)
       return
     end if
     if (tries%held(2)) held = moving
@@ -75,7 +75,8 @@ contains
     call outcome%agree(run%ranks)
   end subroutine find_factor_of_safety
 
-  !> Divide the strength by a factor, and relax from the start.
+  !> Divide the strength by a factor, and relax from the start. Where a signal comes on the way it
+  !> is no try.
   subroutine try(factor, start, unreduced, run, tries, errors)
     real(wp),           intent(in)    :: factor
     type(state_t),      intent(in)    :: start
@@ -97,6 +98,7 @@ contains
     associate (relaxation => run%increments%relaxation, model => run%model)
       call keep_start(relaxation, run%state)
       call relax(model, run%clock%time(), run%state, relaxation, run%timing, relaxed)
+      if (relaxed%stopped) return
       call return_to_start(relaxation, run%state)
       if (allocated(model%operators%relaxing)) call model%operators%relaxing%follow(0.0_wp)
       call forces(model, run%clock%time(), run%state, relaxation%blocks, run%timing, failed_row)
@@ -111,25 +113,6 @@ contains
       ' after '//integer_text(relaxed%moves)//' moves, largest displacement '// &
       short_number(largest)//' m', errors)
   end subroutine try
-
-  !> Go on later: the state at the end of the run is kept.
-  subroutine stop_by_signal(run, outcome, errors)
-    type(run_t),        intent(inout) :: run
-    type(outcome_t),    intent(inout) :: outcome
-    type(error_list_t), intent(inout) :: errors
-    integer :: signal
-
-    signal = signal_of(run%ranks)
-    call save_checkpoint(run%model, run%state, run%ledger, run%clock, run%limit, run%record, &
-      errors)
-    if (errors%count() == 0) call record_line(run%record, &
-      'stopped by a signal ('//signal_name(signal)// &
-      '); --restart looks for the factor of safety anew', errors)
-    call outcome%end_if_any(errors, exit_file)
-    call outcome%agree(run%ranks)
-    if (.not. outcome%done) &
-      call outcome%end_with(merge(exit_interrupted, exit_terminated, signal == sigint))
-  end subroutine stop_by_signal
 
   subroutine tell_factor(tries, run, errors)
     type(tries_t),      intent(in)    :: tries

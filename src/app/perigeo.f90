@@ -39,7 +39,7 @@ program perigeo
     if (run%model%at_equilibrium) then
       call take_increment(run%clock, run%schedule, run%model, run%state, run%increments, &
         run%ledger, run%timing)
-      if (run%increments%lost) then
+      if (run%increments%lost .or. run%increments%last%stopped) then
         call end_without_equilibrium(run, outcome)
         exit
       end if

@@ -4,6 +4,7 @@
 !> because the problem has been reported already.
 module pd_input_checks
   use pd_errors, only: error_list_t
+  use pd_files, only: meant_path
   use pd_input_shapes, only: find_extents, outline
   use pd_input_types, only: body_input_t, input_t
   use pd_input_values, only: group_named, is_damaged, is_given
@@ -74,7 +75,7 @@ contains
     logical :: exists
     integer :: slash
 
-    path = trim(file)
+    path = meant_path(file)
     if (index(path, '/') == 1) return
     slash = index(input%path, '/', back=.true.)
     if (slash == 0) return

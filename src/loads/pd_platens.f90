@@ -11,7 +11,7 @@ module pd_platens
   private
 
   public :: platens_t, new_platens, move_frame, nominal_strain, time_of_strain, reference_ends
-  public :: times_of_strains
+  public :: times_of_strains, press_along
 
   type :: platens_t
     integer  :: axis = 0                     !! 1: x, 2: y, 0: there are no platens
@@ -119,5 +119,15 @@ contains
       upper(c) = platens%upper(c)%rate(t)
     end do
   end subroutine reference_ends
+
+  !> Whether the platens come nearer or part at some time, as far as their motion is known: not
+  !> where they only slide past each other, as in shear.
+  pure logical function press_along(platens)
+    type(platens_t), intent(in) :: platens
+
+    press_along = platens%axis > 0
+    if (allocated(platens%strain%rates)) &
+      press_along = press_along .and. any(abs(platens%strain%rates) > 0.0_wp)
+  end function press_along
 
 end module pd_platens

@@ -27,7 +27,7 @@ module pd_j2
     procedure :: reduced
   end type j2_t
 
-  real(wp), parameter :: tiny_square = 1.0e-30_wp    !! keeps unused quotients finite [Pa^2]
+  real(wp), parameter :: tiny_square = 1.0e-30_wp    !! of h^2: keeps unused quotients finite
   real(wp), parameter :: far = 1.0e100_wp            !! a plastic increment that no point reaches
   real(wp), parameter :: root_3_2 = sqrt(1.5_wp), root_2_3 = sqrt(2.0_wp / 3.0_wp)
 
@@ -95,35 +95,44 @@ contains
     real(wp),         intent(inout) :: flow(n_block, 4)
     real(wp),         intent(inout) :: da(n_block)   !! in: that of a straight path
     type(sliding_t) :: sliding
-    real(wp) :: residual, straight(n_block)
+    real(wp) :: residual, unit, straight(n_block)
     integer  :: i, k, number(n_block)
 
-    sliding%g3 = 3.0_wp * material%shear_modulus
-    sliding%h = -material%kinematic_modulus
-    sliding%hi = material%isotropic_modulus
+    unit = near(material%shear_modulus)
+    sliding%g3 = 3.0_wp * material%shear_modulus / unit
+    sliding%h = -material%kinematic_modulus / unit
+    sliding%hi = material%isotropic_modulus / unit
     k = 0
     do i = 1, n
       if (.not. first(i) < da(i)) cycle
       k = k + 1
       number(k) = i
-      residual = min(material%residual_strength, points%yield_stress(i))
+      residual = min(material%residual_strength, points%yield_stress(i)) / unit
       sliding%strength(k) = strength_now(material, points%yield_stress(i), &
-        points%alpha(i) + first(i))
-      sliding%radius(k) = points%yield_stress(i) - residual
+        points%alpha(i) + first(i)) / unit
+      sliding%radius(k) = points%yield_stress(i) / unit - residual
       if (sliding%hi < 0.0_wp) sliding%radius(k) = max(0.0_wp, sliding%strength(k) - residual)
-      sliding%q(k) = q(i) - (sliding%g3 - sliding%h) * first(i)
+      sliding%q(k) = q(i) / unit - (sliding%g3 - sliding%h) * first(i)
       straight(k) = da(i) - first(i)
     end do
     sliding%n = k
     sliding%da(:k) = straight(:k)
     sliding%flow(:k, :) = flow(number(:k), :)
-    sliding%beta(:k, :) = points%back_stress(number(:k), :)
+    sliding%beta(:k, :) = points%back_stress(number(:k), :) / unit
     call slide(sliding)
     flow(number(:k), :) = sliding%flow(:k, :)
-    points%back_stress(number(:k), :) = sliding%beta(:k, :)
+    points%back_stress(number(:k), :) = unit * sliding%beta(:k, :)
     ! a straight path keeps the bits of its da
     da(number(:k)) = da(number(:k)) + (sliding%da(:k) - straight(:k))
   end subroutine end_on_bound
+
+  !> A power of two near a stress. Counted in it, products of stresses neither overflow nor vanish,
+  !> whatever their unit is; it makes no round-off.
+  pure real(wp) function near(stress) result(unit)
+    real(wp), intent(in) :: stress   !! [Pa]
+
+    unit = scale(1.0_wp, exponent(stress))
+  end function near
 
   !> dev S*, q* = sqrt(3/2)|eta*| and eta* / |eta*|.
   pure subroutine flow_directions(n, points, s, q, flow)
@@ -183,8 +192,8 @@ contains
       radius(i) = max(lowest, r) - min(material%residual_strength, points%yield_stress(i))
       room(i) = radius(i) * one_over_k + no_floor
     end do
-    if (material%kinematic_modulus < 0.0_wp) call end_at_bound(-material%kinematic_modulus, k, n, &
-      points, flow, radius, room)
+    if (material%kinematic_modulus < 0.0_wp) &
+      call end_at_bound([-material%kinematic_modulus, k], n, points, flow, radius, room)
     !$omp simd simdlen(8) private(lowest, strength, f)
     do i = 1, n
       lowest = min(floor_strength, points%yield_stress(i))
@@ -204,33 +213,37 @@ contains
   !> (h^2 - k^2) da^2 - 2 (h b . n - r k) da - (r^2 - b . b) = 0, in the form that does not cancel.
   !> Written without a branch: every quotient is finite, also where it is not used. They are kept
   !> for a loop of their own, for what is computed only to be chosen becomes a branch.
-  pure subroutine end_at_bound(h, k, n, points, flow, radius, room)
-    real(wp),         intent(in)    :: h, k              !! h > 0, k >= 0 [Pa]
+  pure subroutine end_at_bound(moduli, n, points, flow, radius, room)
+    real(wp),         intent(in)    :: moduli(2)         !! h > 0, k >= 0 [Pa]
     integer,          intent(in)    :: n
     type(yielding_t), intent(in)    :: points
     real(wp),         intent(in)    :: flow(n_block, 4)
     real(wp),         intent(in)    :: radius(n_block)   !! r [Pa]
     real(wp),         intent(inout) :: room(n_block)
-    real(wp) :: square, square_or_tiny, edge, bb, bn, rest, least, largest
+    real(wp) :: unit, in_unit, h, k, r, square, square_or_tiny, edge, bb, bn, rest, least
     real(wp) :: linear(n_block), reach(n_block), of_square(n_block), of_reach(n_block)
     integer  :: i
 
+    unit = near(maxval(moduli))
+    in_unit = 1.0_wp / unit
+    h = in_unit * moduli(1)
+    k = in_unit * moduli(2)
     square = h**2 - k**2
     square_or_tiny = merge(square, tiny_square, square > 0.0_wp)
     edge = merge(0.0_wp, far, square > 0.0_wp)
-    largest = max(h, k)
-    !$omp simd simdlen(8) private(bb, bn, rest, least)
+    !$omp simd simdlen(8) private(r, bb, bn, rest, least)
     do i = 1, n
-      bb = 1.5_wp * (points%back_stress(i, 1)**2 + points%back_stress(i, 2)**2 &
+      r = in_unit * radius(i)
+      bb = 1.5_wp * in_unit**2 * (points%back_stress(i, 1)**2 + points%back_stress(i, 2)**2 &
         + points%back_stress(i, 3)**2 + 2.0_wp * points%back_stress(i, 4)**2)
-      bn = root_3_2 * (points%back_stress(i, 1) * flow(i, 1) &
+      bn = root_3_2 * in_unit * (points%back_stress(i, 1) * flow(i, 1) &
         + points%back_stress(i, 2) * flow(i, 2) + points%back_stress(i, 3) * flow(i, 3) &
         + 2.0_wp * points%back_stress(i, 4) * flow(i, 4))
-      rest = max(0.0_wp, radius(i)**2 - bb)
-      linear(i) = h * bn - radius(i) * k
+      rest = max(0.0_wp, r**2 - bb)
+      linear(i) = h * bn - r * k
       reach(i) = sqrt(max(0.0_wp, linear(i)**2 + square * rest)) + abs(linear(i))
-      ! small beside the products of stresses in `reach`, in whatever unit
-      least = tiny_square * min(1.0_wp, largest * points%yield_stress(i))
+      ! small beside the products of stresses in `reach`
+      least = tiny_square * min(1.0_wp, in_unit * points%yield_stress(i))
       of_square(i) = reach(i) / square_or_tiny
       of_reach(i) = rest / max(reach(i), least)
     end do

@@ -11,22 +11,23 @@ module pd_sliding
 
   public :: sliding_t, slide
 
-  !> Points of a block whose back stress has met its bound.
+  !> Points of a block whose back stress has met its bound. Stresses are counted in a unit near G,
+  !> so that `least` is small beside them.
   type :: sliding_t
     integer  :: n = 0                 !! points
-    real(wp) :: g3, h, hi             !! 3 G, |H_k| with H_k < 0, H_i [Pa]
-    real(wp) :: strength(n_block)     !! sigma_y1 [Pa]
-    real(wp) :: radius(n_block)       !! R1; where H_i < 0 it falls with sigma_y [Pa]
-    real(wp) :: q(n_block)            !! sqrt(3/2)|eta| before the rest [Pa]
+    real(wp) :: g3, h, hi             !! 3 G, |H_k| with H_k < 0, H_i [unit]
+    real(wp) :: strength(n_block)     !! sigma_y1 [unit]
+    real(wp) :: radius(n_block)       !! R1; where H_i < 0 it falls with sigma_y [unit]
+    real(wp) :: q(n_block)            !! sqrt(3/2)|eta| before the rest [unit]
     real(wp) :: flow(n_block, 4)      !! flow direction n, |n| = 1; xx yy zz xy
-    real(wp) :: beta(n_block, 4)      !! back stress [Pa]
+    real(wp) :: beta(n_block, 4)      !! back stress [unit]
     real(wp) :: da(n_block)           !! plastic increment of the rest; in: that of a straight path
   end type sliding_t
 
   !> a = sqrt(3/2) dev S and b = sqrt(3/2) beta before the rest, and their products.
   type :: planes_t
-    real(wp) :: a(n_block, 4), b(n_block, 4)                    !! [Pa]
-    real(wp) :: aa(n_block), ab(n_block), bb(n_block)           !! a . a, a . b, b . b [Pa^2]
+    real(wp) :: a(n_block, 4), b(n_block, 4)                    !! [unit]
+    real(wp) :: aa(n_block), ab(n_block), bb(n_block)           !! a . a, a . b, b . b [unit^2]
     logical  :: solved(n_block)                                 !! the answer needs no search
   end type planes_t
 
@@ -34,11 +35,11 @@ module pd_sliding
   type :: trials_t
     real(wp) :: t(n_block)
     real(wp) :: da(n_block)           !! plastic increment
-    real(wp) :: length(n_block)       !! |a - t b| [Pa]
-    real(wp) :: distance(n_block)     !! |b - h da n| [Pa]
-    real(wp) :: radius(n_block)       !! R at the end [Pa]
-    real(wp) :: excess(n_block)       !! t |b - h da n| - R: zero at the answer [Pa]
-    real(wp) :: slope(n_block)        !! of the excess with t [Pa]
+    real(wp) :: length(n_block)       !! |a - t b| [unit]
+    real(wp) :: distance(n_block)     !! |b - h da n| [unit]
+    real(wp) :: radius(n_block)       !! R at the end [unit]
+    real(wp) :: excess(n_block)       !! t |b - h da n| - R: zero at the answer [unit]
+    real(wp) :: slope(n_block)        !! of the excess with t [unit]
   end type trials_t
 
   !> |b - (b : n) n| / |b| below which the path counts as straight: the answer is then known.
@@ -46,7 +47,7 @@ module pd_sliding
   real(wp), parameter :: root_3_2 = sqrt(1.5_wp), root_2_3 = sqrt(2.0_wp / 3.0_wp)
   real(wp), parameter :: close = 1.0e-9_wp       !! the error after such a step is of its square
   integer,  parameter :: most_trials = 100   !! bisection alone needs 53
-  real(wp), parameter :: least = 1.0e-100_wp     !! keeps quotients finite that are not used [Pa]
+  real(wp), parameter :: least = 1.0e-100_wp     !! keeps quotients finite that are not used [unit]
 
 contains
 

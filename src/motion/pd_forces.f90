@@ -15,7 +15,7 @@ module pd_forces
   implicit none
   private
 
-  public :: forces, internal_forces, linear_forces, next_step_t, prepare_next_step
+  public :: forces, internal_forces, find_gradient, linear_forces, next_step_t, prepare_next_step
 
   !> Where a step leads a state, if the points go on as they move.
   type :: next_step_t
@@ -48,6 +48,21 @@ contains
     end associate
     call timing%lap(kernel_boundaries)
   end subroutine forces
+
+  !> H of the present displacement at time t, and nothing else.
+  subroutine find_gradient(model, t, state)
+    type(model_t), intent(inout) :: model
+    real(wp),      intent(in)    :: t       !! [s]
+    type(state_t), intent(inout) :: state
+    integer :: block
+
+    call model%operators%mirror%move(t)
+    call model%operators%take_in(state%displacement, model%operators%mirror%place)
+    do block = 1, model%blocks%count
+      call model%operators%gradient_block(model%blocks%lo(block), model%blocks%hi(block), &
+        state%displacement, state%displacement_gradient)
+    end do
+  end subroutine find_gradient
 
   !> Internal force density, the zero-energy control included.
   subroutine internal_forces(operators, materials, volume, state, work, timing, failed_row)

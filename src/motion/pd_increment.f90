@@ -11,7 +11,7 @@
 !> Source: doc/theory.md, section 6.
 module pd_increment
   use pd_clock, only: clock_t
-  use pd_forces, only: forces
+  use pd_forces, only: find_gradient, forces
   use pd_kinds, only: wp
   use pd_ledger, only: ledger_t
   use pd_model, only: model_t
@@ -24,7 +24,7 @@ module pd_increment
   implicit none
   private
 
-  public :: increments_t, new_increments, begin_increments, take_increment
+  public :: increments_t, new_increments, begin_increments, take_increment, take_back
 
   !> A number of an increment that stands out.
   type :: moment_t
@@ -83,9 +83,11 @@ contains
 
   !> One increment, from the time of the clock to the next; the clock may be set to a shorter one.
   !>
-  !> Where none is found with the shortest increment it is `lost`, and the state is that before it.
-  !> A residual that is small all the same will do, but not while loads grow: beyond their limit the
-  !> body gives way ever more slowly, the shorter the increments are.
+  !> Where none is found with the shortest increment it is `lost`, and the state is that of the last
+  !> try. A residual that is small all the same will do, but not while loads grow: beyond their
+  !> limit the body gives way ever more slowly, the shorter the increments are.
+  !>
+  !> Where a signal comes on the way it is `stopped`: state, clock and schedule are those before it.
   subroutine take_increment(clock, schedule, model, state, increments, ledger, timing)
     type(clock_t),      intent(inout) :: clock
     type(schedule_t),   intent(inout) :: schedule
@@ -94,8 +96,12 @@ contains
     type(increments_t), intent(inout) :: increments
     type(ledger_t),     intent(inout) :: ledger
     type(timing_t),     intent(inout) :: timing
+    type(clock_t) :: clock_before
+    type(schedule_t) :: schedule_before
     real(wp) :: t
 
+    clock_before = clock
+    schedule_before = schedule
     associate (relaxation => increments%relaxation, last => increments%last)
       t = clock%time()
       call timing%begin(clock%step + 1)
@@ -103,19 +109,21 @@ contains
       do
         call guess(model, t, clock%time_step, relaxation, state)
         call relax(model, t + clock%time_step, state, relaxation, timing, last)
-        if (last%at_rest .or. clock%time_step <= increments%shortest) exit
+        if (last%at_rest .or. last%stopped .or. clock%time_step <= increments%shortest) exit
         call return_to_start(relaxation, state)
         call set_increment(0.5_wp * clock%time_step, clock, schedule)
       end do
+      if (last%stopped) then
+        clock = clock_before
+        schedule = schedule_before
+        call take_back(t, model, state, increments)
+        return
+      end if
       increments%under_load = loads_at(model, t + clock%time_step) > loads_at(model, t)
       if (model%releases) increments%under_load = .true.
       increments%lost = .not. last%at_rest .and. (increments%under_load &
         .or. last%failed_row > 0 .or. last%residual > most_residual)
-      if (increments%lost) then
-        call return_to_start(relaxation, state)
-        state%displacement = relaxation%displacement
-        return
-      end if
+      if (increments%lost) return
       call clock%advance()
       if (.not. last%at_rest) call increments%unfinished%see(clock%step, last%residual)
       call settle(model, t, clock%time_step, relaxation, state, timing)
@@ -124,16 +132,30 @@ contains
     call choose_next(schedule, next_length(increments, clock%time_step), clock)
   end subroutine take_increment
 
-  !> First guess of the next equilibrium: the motion goes on.
+  !> The state before the increment, all of it.
+  subroutine take_back(t, model, state, increments)
+    real(wp),           intent(in)    :: t            !! at its start [s]
+    type(model_t),      intent(inout) :: model        !! its planes of mirrors move
+    type(state_t),      intent(inout) :: state
+    type(increments_t), intent(in)    :: increments
+
+    call return_to_start(increments%relaxation, state)
+    state%displacement = increments%relaxation%displacement
+    call find_gradient(model, t, state)
+  end subroutine take_back
+
+  !> First guess of the next equilibrium: the motion goes on. The velocity of the state stays that
+  !> of the last increment.
   subroutine guess(model, t, duration, relaxation, state)
     type(model_t),      intent(inout) :: model         !! its planes of mirrors move
     real(wp),           intent(in)    :: t, duration   !! [s]
     type(relaxation_t), intent(in)    :: relaxation
     type(state_t),      intent(inout) :: state
-    real(wp), allocatable :: place(:)
+    real(wp), allocatable :: place(:), prescribed(:, :)
 
     state%displacement = relaxation%displacement + duration * model%points%free * state%velocity
-    call model%supports%prescribe(t + duration, state%displacement, state%velocity)
+    allocate (prescribed, source=state%velocity)
+    call model%supports%prescribe(t + duration, state%displacement, prescribed)
     associate (mirror => model%operators%mirror)
       if (mirror%n == 0) return
       allocate (place, source=mirror%place)

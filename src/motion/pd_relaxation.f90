@@ -20,6 +20,7 @@
 !> ever more slowly, so that it cannot swing with it.
 !> Source: doc/theory.md, section 6.
 module pd_relaxation
+  use pd_agreement, only: signal_of
   use pd_forces, only: internal_forces
   use pd_kinds, only: block_sum, n_block, wp
   use pd_model, only: model_t
@@ -55,6 +56,7 @@ module pd_relaxation
   !> What came of it.
   type :: relaxed_t
     logical  :: at_rest = .false.       !! the residual is reached
+    logical  :: stopped = .false.       !! a signal came on the way
     real(wp) :: residual = 0.0_wp       !! unbalanced force over that from outside
     integer  :: moves = 0
     integer  :: failed_row = 0          !! 0, or the first row whose det F is not positive
@@ -130,8 +132,8 @@ contains
     state%force = relaxation%start_force
   end subroutine return_to_start
 
-  !> Move the body from a first guess until it is at rest; prescribed components stay where they
-  !> are.
+  !> Move the body from a first guess until it is at rest, or a signal comes; prescribed components
+  !> stay where they are.
   subroutine relax(model, t, state, relaxation, timing, relaxed)
     type(model_t),      intent(inout) :: model
     real(wp),           intent(in)    :: t            !! [s]
@@ -140,6 +142,7 @@ contains
     type(timing_t),     intent(inout) :: timing
     type(relaxed_t),    intent(out)   :: relaxed
     type(pace_t) :: pace
+    integer, parameter :: look_every = 8   ! moves: ranks ask each other
     real(wp) :: sums(n_sums), loads
     integer  :: k
 
@@ -165,6 +168,8 @@ contains
       relaxed%residual = over(sums(free_force), sums(held_force) + loads)
       relaxed%at_rest = relaxed%residual <= relaxation%residual
       if (relaxed%at_rest) exit
+      if (modulo(k, look_every) == 0) relaxed%stopped = signal_of(model%blocks%ranks) /= 0
+      if (relaxed%stopped) exit
       call move_on(next_move(relaxation%rule, k, sums, pace), model, state, relaxation)
       call timing%lap(kernel_motion)
     end do

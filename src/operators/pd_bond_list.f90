@@ -14,6 +14,7 @@ module pd_bond_list
   use pd_sight, only: sight_t
   use pd_storage, only: listed_storage
   use pd_stretches, only: new_stretches
+  use pd_text, only: integer_text, number_text
   implicit none
   private
 
@@ -153,7 +154,6 @@ contains
     real(wp),           intent(in)    :: position(:, :)
     type(error_list_t), intent(inout) :: errors
     integer, parameter :: most_reported = 10
-    character(96) :: text
     real(wp)      :: scale, distance
     integer       :: i, j, n_found
     integer(i8)   :: b
@@ -168,14 +168,12 @@ contains
         if (distance > 1.0e-9_wp * scale) cycle
         n_found = n_found + 1
         if (n_found > most_reported) cycle
-        write (text, '(a,i0,a,i0,a,g0.7,a,g0.7,a)') 'points ', i, ' and ', j, &
-          ' coincide at (', position(i, 1), ', ', position(i, 2), ') m'
-        call errors%add(trim(text))
+        call errors%add('points '//integer_text(i)//' and '//integer_text(j)//' coincide at ('// &
+          number_text(position(i, 1))//', '//number_text(position(i, 2))//') m')
       end do
     end do
     if (n_found > most_reported) then
-      write (text, '(i0,a)') n_found - most_reported, ' more pairs of points coincide'
-      call errors%add(trim(text))
+      call errors%add(integer_text(n_found - most_reported)//' more pairs of points coincide')
     end if
   end subroutine report_coincident
 

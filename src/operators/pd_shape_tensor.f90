@@ -6,6 +6,7 @@ module pd_shape_tensor
   use pd_kinds, only: wp
   use pd_operators, only: operators_t
   use pd_pages, only: clear_rows
+  use pd_text, only: coordinate_text, integer_text
   implicit none
   private
 
@@ -26,7 +27,6 @@ contains
     integer,  parameter :: most_reported = 10
     real(wp), allocatable :: k(:, :)
     real(wp) :: mean, radius, determinant
-    character(160) :: text
     integer  :: i, n_singular, singular(operators%domain%blocks%count)
 
     allocate (k(operators%n, 3), operators%k_inverse(operators%n, 3))
@@ -46,10 +46,12 @@ contains
       else
         n_singular = n_singular + 1
         if (n_singular > most_reported) cycle
-        write (text, '(a,i0,a,g0.7,a,g0.7,a)') 'point ', operators%storage%point_at(i), ' at (', &
-          position(i, 1), ', ', position(i, 2), ') m'
         call errors%add('the shape tensor is singular: the family is too small or lies on '// &
-          'one line', trim(text), allowed='condition number below 1e6; a larger horizon helps')
+          'one line', 'point '//integer_text(operators%storage%point_at(i))//' at ('// &
+          coordinate_text(position(i, 1), sqrt(volume(i)))//', '// &
+          coordinate_text(position(i, 2), sqrt(volume(i)))//') m', &
+          allowed='condition number below 1e6; a larger horizon helps, or a smaller spacing '// &
+          'where the body is a single row of points')
       end if
     end do
     ! what other ranks have found is counted: the first that has found something tells
@@ -57,8 +59,7 @@ contains
     if (size(singular) > 0) singular(1) = n_singular
     i = nint(operators%domain%blocks%total(real(singular, wp))) - min(n_singular, most_reported)
     if (n_singular > 0 .and. i > 0) then
-      write (text, '(i0,a)') i, ' more points have a singular shape tensor'
-      call errors%add(trim(text))
+      call errors%add(integer_text(i)//' more points have a singular shape tensor')
     end if
   end subroutine invert_shape_tensors
 

@@ -8,6 +8,7 @@ module pd_setup_schedule
   use pd_platens, only: times_of_strains
   use pd_schedule, only: new_schedule, schedule_t
   use pd_stability, only: find_highest_frequency
+  use pd_text, only: number_text
   implicit none
   private
 
@@ -62,15 +63,13 @@ contains
     function strain_times(strains) result(times)
       real(wp), intent(in) :: strains(:)
       real(wp) :: times(size(strains))
-      character(24) :: text
       integer :: i
 
       times = times_of_strains(model%platens, strains)
       do i = 1, size(strains)
         if (times(i) > 0.0_wp) cycle
-        write (text, '(g0.6)') strains(i)
         call errors%add('the motion of the platens never reaches a nominal strain', &
-          '&integration final_strain or &output frame_strains', trim(text))
+          '&integration final_strain or &output frame_strains', number_text(strains(i)))
       end do
     end function strain_times
 

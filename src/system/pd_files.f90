@@ -16,7 +16,7 @@ module pd_files
   public :: output_file_t, open_output, write_line, flush_output, check_in_place
   public :: close_output
   public :: replace_file, sync_file, patch_file, cut_file, size_of_file, publish_output
-  public :: prepare_folder, file_exists
+  public :: prepare_folder, file_exists, meant_path
 
   !> A text file that is being written. After the first failure nothing more is written to it and
   !> nothing more is reported.
@@ -210,6 +210,11 @@ contains
     character(*),       intent(in)    :: path
     type(error_list_t), intent(inout) :: errors
 
+    if (index(path, '~') == 1) then
+      call errors%add('the home folder is not known', where=path, &
+        allowed='~/... where HOME is set, ./~... for a folder of this name')
+      return
+    end if
     if (make_directories(path)) return
     call errors%add('the output folder cannot be created or cannot be written to: is writing ' &
       //'permitted, is a file of that name in the way?', where=path)
@@ -220,5 +225,20 @@ contains
 
     inquire (file=path, exist=file_exists)
   end function file_exists
+
+  !> The path that a user means: without blanks at its ends, and ~ is the home folder.
+  function meant_path(text) result(path)
+    character(*), intent(in) :: text
+    character(:), allocatable :: path, home
+    integer :: length
+
+    path = trim(adjustl(text))
+    if (path /= '~' .and. index(path, '~/') /= 1) return
+    call get_environment_variable('HOME', length=length)
+    if (length == 0) return
+    allocate (character(length) :: home)
+    call get_environment_variable('HOME', home)
+    path = home//path(2:)
+  end function meant_path
 
 end module pd_files

@@ -340,11 +340,13 @@ def test_a_failure_tells_the_state_at_the_point_and_what_helps(run_case, tmp_pat
 def test_every_run_ends_with_its_quality(run_case, tmp_path):
     control = "&stabilisation method = 'relaxing' /\n"
     still = re.sub(r"damping = [^/]*", "method = 'equilibrium' ", SHORT)
+    sheared = changed(PUSHED.replace("contact = 'smooth', ", ""), velocity="0.01, 0.0")
     for text, left_out in (
         (SHORT, {"control_share"}),
         (PUSHED + control, set()),
         (still, {"kinetic_ratio", "damping_share", "control_share"}),
         (HELD + PRESSED, {"reaction_gap", "control_share"}),
+        (sheared, {"reaction_gap", "control_share"}),
     ):
         done = run_case(text, tmp_path, "--quiet", "--force")
         assert done.returncode == 0, done.stderr

@@ -139,7 +139,7 @@ def test_a_model_that_cannot_be_set_up_is_status_3(run_case, tmp_path, line, mes
 def test_the_singular_point_is_named(run_case, tmp_path):
     (tmp_path / "cloud.txt").write_text("\n".join([*GRID, "2.0 3.0 0.01", ""]))
     done = run_case(CLOUD, tmp_path)
-    assert "point 26 at (2.000000, 3.000000) m" in done.stderr
+    assert "point 26 at (2, 3) m" in done.stderr
 
 
 def test_a_boundary_without_points_cannot_be_set_up(run_case, tmp_path):

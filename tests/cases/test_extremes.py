@@ -1,8 +1,10 @@
 """Numbers and limits beyond all sense: a sentence, never a trap, a hang or a crash."""
 
+import re
 import resource
 import subprocess
 
+import h5py
 import pytest
 from case_files import SPECIMEN, changed, without_group
 
@@ -63,3 +65,48 @@ def test_a_small_stack_is_enough_or_is_told(program, tmp_path, threads):
         assert done.returncode == status, (kilobytes, done.stderr)
         told = f"the limit of the stack (ulimit -s) is too small for any run; found: {kilobytes} kB"
         assert (told in done.stderr) == (status == 3)
+
+
+OF_STRESS = ("density", "youngs_modulus", "yield_stress", "kinematic_modulus", "isotropic_modulus",
+             "residual_strength", "damping")  # fmt: skip
+FAR = changed(SPECIMEN, final_strain="0.1", frame_strains="0.02, 0.1")
+UNITS = {
+    "softening": FAR + "&stabilisation method = 'relaxing' /\n",
+    "both moduli": changed(FAR, kinematic_modulus="-1.5e6, isotropic_modulus = -1.0e6"),
+    "at rest": re.sub(r"damping = [^/]*", "method = 'equilibrium', increments = 40 ", FAR),
+}
+
+
+def in_unit(text, unit):
+    """Return an input with all stresses, and the density and damping, a factor larger."""
+
+    def factor(match):
+        return f"{match[1]} = {float(match[2]) * unit!r}"
+
+    return re.sub(rf"\b({'|'.join(OF_STRESS)}) = ([-+.\deE]+)", factor, text)
+
+
+def numbers_of(path):
+    """Return all numbers of a result with whether their unit is one of stress."""
+    with h5py.File(path) as file:
+        rows = {name: data[()] for name, data in file["history"].items()}
+        units = {name: data.attrs["unit"] for name, data in file["history"].items()}
+        for name, data in file["frames/000002"].items():
+            rows[f"frame {name}"] = data[()]
+            units[f"frame {name}"] = data.attrs["unit"]
+    return {name: (data, units[name] in (b"Pa", b"N/m", b"J/m")) for name, data in rows.items()}
+
+
+@pytest.mark.parametrize("case", UNITS)
+def test_the_unit_of_stress_changes_no_bit(run_case, tmp_path, case):
+    """Powers of two have no round-off of their own: 2e-87, 1e-20, 7e19 and 2e87."""
+    assert run_case(UNITS[case], tmp_path, "--quiet").returncode == 0
+    wanted = numbers_of(tmp_path / "out" / "case.h5")
+    assert wanted["max_plastic_strain"][0][-1] > 0.1
+    for exponent in (-288, -66, 66, 290):
+        unit = 2.0**exponent
+        done = run_case(in_unit(UNITS[case], unit), tmp_path, "--quiet", "--force")
+        assert done.returncode == 0, done.stderr
+        for name, (found, scaled) in numbers_of(tmp_path / "out" / "case.h5").items():
+            expected = wanted[name][0] * unit if scaled else wanted[name][0]
+            assert (expected == found).all(), (exponent, name)

@@ -203,7 +203,7 @@ REFUSED = {
         + "&cut x = 0.46, 0.54, y = 2.1, 1.85 /\n&cut x = 0.46, 0.56, y = 1.85, 1.85 /\n"
         + "&cut x = 0.56, 0.54, y = 1.8, 2.1 /\n",
         3,
-        "point 349 at (0.5000000, 2.000000) m: the shape tensor is singular: the family is too "
+        "point 349 at (0.5, 2) m: the shape tensor is singular: the family is too "
         "small or lies on one line; allowed: ",
     ),
 }

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..measure import export, measures
 from ..measure.band import LEVEL, BandMeasure
+from ..read.numerals import fixed, place
 from ..read.run import Run
 from .options import (
     Arguments,
@@ -77,24 +78,30 @@ def _fitted_text(m: BandMeasure) -> str:
     if not fitted.places:
         return "unknown: no profile could be fitted along the band"
     return (
-        f"{fitted.width:.4f} m, median of fits at {fitted.places} places along the band; half the "
-        f"distance of the quartiles {fitted.spread:.2g} m"
+        f"{fixed(fitted.width, 4)} m, median of fits at {fitted.places} places along the band; "
+        f"half the distance of the quartiles {fitted.spread:.2g} m"
     )
+
+
+def _length(value: float) -> str:
+    return f"{fixed(value, 4)} m" if np.isfinite(value) else "not known"
 
 
 def _band_text(m: BandMeasure) -> str:
     w, b = m.interpolated, m.bands
     (x0, y0), (x1, y1) = m.profile.line
+    size = float(m.profile.distance[-1])
     state = f"strain {m.strain:.6g}" if np.isfinite(m.strain) else f"time {m.time:.6g} s"
     more = "" if w.closed else " at least (the line ends before the level is reached)"
     lines = [
         f"{m.label} at {state}",
         f"  width at {100 * w.level:g} % of the peak {_fitted_text(m)}",
-        f"  between points {w.width:.4f} m +- {w.uncertainty:.3g} m{more}, peak {w.peak:.4g},",
-        f"  on the line ({x0:.4g}, {y0:.4g}) to ({x1:.4g}, {y1:.4g}) m, peak at "
-        f"({w.peak_position[0]:.4g}, {w.peak_position[1]:.4g}) m",
-        f"  {m.interpolated_normal:.4f} m at right angles to the band; median along the band "
-        f"{b.prevailing.width_interpolated:.4f} m",
+        f"  between points {fixed(w.width, 4)} m +- {w.uncertainty:.3g} m{more}, peak "
+        f"{w.peak:.4g},",
+        f"  on the line {place(x0, y0, size)} to {place(x1, y1, size)} m, peak at "
+        f"{place(*w.peak_position, size)} m",
+        f"  {fixed(m.interpolated_normal, 4)} m at right angles to the band; median along the band "
+        f"{_length(b.prevailing.width_interpolated)}",
     ]
     for band in (b.prevailing, b.other):
         if band is not None:
@@ -103,7 +110,8 @@ def _band_text(m: BandMeasure) -> str:
             lines.append(
                 f"  {kind} band, {band.direction}: {band.angle:.1f} +- "
                 f"{band.angle_uncertainty:.1f} degrees from the loading axis ({b.axis}), from "
-                f"({x0:.3g}, {y0:.3g}) to ({x1:.3g}, {y1:.3g}) m, strength {band.strength:.4g}"
+                f"{place(x0, y0, size, 3)} to {place(x1, y1, size, 3)} m, strength "
+                f"{band.strength:.4g}"
             )
     if m.resolved is False:
         lines.append(

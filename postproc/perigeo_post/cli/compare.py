@@ -11,6 +11,7 @@ import numpy as np
 
 from ..measure import export, measures
 from ..measure.curves import stress_strain
+from ..read.numerals import fixed
 from ..read.run import Run
 from .options import (
     Arguments,
@@ -79,15 +80,15 @@ def _table_text(rows: list[dict[str, Any]]) -> str:
     heads: dict[str, tuple[str, Callable[[Any], str]]] = {
         "run": ("run", str),
         "points": ("points", str),
-        "peak_stress": ("peak stress [kPa]", lambda v: f"{v / 1e3:.2f}"),
+        "peak_stress": ("peak stress [kPa]", lambda v: fixed(v / 1e3, 2)),
         "strain_at_peak": ("at strain", lambda v: f"{v:.6f}"),
-        "apparent_modulus": ("E_app [MPa]", lambda v: f"{v / 1e6:.2f}"),
+        "apparent_modulus": ("E_app [MPa]", lambda v: fixed(v / 1e6, 2)),
         "last_strain": ("last strain", lambda v: f"{v:.6f}"),
         "largest_plastic_strain": ("largest alpha", lambda v: f"{v:.4f}"),
     }
     for key in dict.fromkeys(key for row in rows for key in row):
         if key.startswith("stress_at_"):
-            heads[key] = (f"kPa at {key[10:]}", lambda v: f"{v / 1e3:.2f}")
+            heads[key] = (f"kPa at {key[10:]}", lambda v: fixed(v / 1e3, 2))
         if key.startswith("alpha_at_"):
             heads[key] = (f"alpha at {key[9:]}", lambda v: f"{v:.4f}")
     table = [[head for head, _ in heads.values()]]

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..measure import measures
+from ..read.numerals import fixed
 from ..read.run import Run
 from .options import Arguments, add_files, add_json, print_json
 
@@ -128,13 +129,15 @@ def _history_text(history: dict[str, Any]) -> list[str]:
     ]
     if history.get("peak_stress") is not None and history["rows"]:
         lines.append(
-            f"  peak stress  {history['peak_stress'] / 1e3:.2f} kPa at a strain of "
+            f"  peak stress  {fixed(history['peak_stress'] / 1e3, 2)} kPa at a strain of "
             f"{history['strain_at_peak']:.6f} (compression positive)"
         )
         modulus = history.get("apparent_modulus")
-        text = f"{modulus / 1e6:.2f} MPa" if modulus is not None else "not determined: "
+        text = f"{fixed(modulus / 1e6, 2)} MPa" if modulus is not None else "not determined: "
         reason = history.get("apparent_modulus_missing", "")
         lines.append(f"  E_app        {text}{reason}")
+    if "curve_missing" in history:
+        lines.append(f"  axial stress not shown: {history['curve_missing']}")
     lines += _loads_text(history.get("limit_loads", []))
     if "largest_energy_error" in history:
         lines.append(f"  energy error {history['largest_energy_error']:.2e} at most")
@@ -162,4 +165,4 @@ def _loads_text(loads: list[dict[str, Any]]) -> list[str]:
 
 
 def _force(value: float) -> str:
-    return f"{value / 1e3:.3f} kN/m"
+    return f"{fixed(value / 1e3, 3)} kN/m"

@@ -14,6 +14,7 @@ from ..measure.measures import labels_for, measure_band
 from ..measure.smooth import smoothed_for
 from ..read.errors import RequestError
 from ..read.fields import label_of
+from ..read.numerals import fixed, place
 from ..read.run import Frame, Run
 from .contours import columns_for, common_extent, common_scale, deformation_note, panel_of
 from .layout import Place
@@ -148,7 +149,7 @@ def stress_strain_figure(
                 factor, unit = prefix_for(abs(stress), curves[0].y_unit)
                 ax.plot([100.0 * strain], [stress * factor], "o", color=COLOURS[1])
                 ax.annotate(
-                    f"peak {stress * factor:.1f} {unit} at {100.0 * strain:.3f} %",
+                    f"peak {fixed(stress * factor, 1)} {unit} at {100.0 * strain:.3f} %",
                     (100.0 * strain, stress * factor), xytext=(5, 3 if stress > 0.0 else -3),
                     textcoords="offset points", fontsize=7,
                     va="bottom" if stress > 0.0 else "top",
@@ -199,7 +200,8 @@ def band_words(measure: BandMeasure) -> str:
     factor, unit = unit_for(float(measure.profile.distance[-1]))
     between, fitted = factor * width.width, factor * measure.width
     sign = "" if width.closed else "≥ "
-    ends = [f"({factor * x:.4g}, {factor * y:.4g})" for x, y in measure.profile.line]
+    size = factor * float(measure.profile.distance[-1])
+    ends = [place(factor * x, factor * y, size) for x, y in measure.profile.line]
     return (
         f"Prevailing band, {strong.angle:.1f}° ± {strong.angle_uncertainty:.1f}° to the loading "
         f"axis\nweaker over stronger band {measure.bands.ratio:.2f}\n"

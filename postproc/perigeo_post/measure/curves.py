@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -180,6 +181,8 @@ def apparent_modulus(
     low, high = strain_range
     inside = first_loading(np.abs(curve.x), strain_range)
     rows = int(inside.sum())
+    if rows:
+        refuse_growing_loads(run, float(run.history()["time"][np.flatnonzero(inside)[0]]))
     if rows < 3:
         raise RequestError(
             f"{run.path}: {rows} rows of the history lie between {low:g} and {high:g} strain, "
@@ -195,6 +198,17 @@ def poissons_ratio(run: Run, nu: float | None = None) -> float:
     if ratio is None:
         raise RequestError(f"{run.path} does not say Poisson's ratio of its material")
     return ratio
+
+
+def refuse_growing_loads(run: Run, time: float) -> None:
+    """Refuse a modulus from this time on while pressures or gravity grow: the slope is none."""
+    grow = [key for key in run.values if re.match(r"(pressure|gravity)\b.*\.ramp_time$", key)]
+    end = max((run.number(key) or 0.0 for key in grow), default=0.0)
+    if time < end * (1.0 - 1e-9):
+        raise RequestError(
+            f"{run.path}: loads grow until {end:g} s while the platens approach each other: the "
+            "slope of stress against strain is no modulus then"
+        )
 
 
 def first_loading(strain: FloatArray, strain_range: tuple[float, float]) -> BoolArray:

@@ -261,7 +261,9 @@ def _history_facts(run: Run) -> dict[str, Any]:
         "columns": {name: history.unit(name) for name in history},
         "descriptions": {name: history.description(name) for name in history},
     }
-    if run.platens is not None:
+    if run.platens and history.rows > 1 and "strain" in history and not history["strain"].any():
+        facts["curve_missing"] = "the platens have not approached each other"
+    elif run.platens is not None:
         try:
             facts.update({k: v for k, v in curve_numbers(run).items() if k not in ("run", "file")})
         except FieldNotFoundError as error:

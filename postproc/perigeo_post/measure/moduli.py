@@ -23,7 +23,14 @@ import numpy as np
 from ..read.errors import FieldNotFoundError, RequestError
 from ..read.points import FloatArray
 from ..read.run import Frame, Run
-from .curves import MODULUS_RANGE, Modulus, axial_stress, first_loading, poissons_ratio
+from .curves import (
+    MODULUS_RANGE,
+    Modulus,
+    axial_stress,
+    first_loading,
+    poissons_ratio,
+    refuse_growing_loads,
+)
 
 GAUGE = (0.25, 0.75)  # where the lines of the gauge lie, as parts of the extent
 CUT = 2.0  # horizons from the line, beyond which a point does not count
@@ -103,6 +110,7 @@ def gauge_modulus(
             f"{run.path}: {len(frames)} frames lie between {low:g} and {high:g} strain, at least "
             "2 are needed for the gauge (add some to frame_strains)"
         )
+    refuse_growing_loads(run, frames[0].time)
     x = np.array([gauge_strain(frame, lines, thick) for frame in frames])
     y = np.interp([frame.time for frame in frames], time[: len(stress)], stress)
     slope = float(np.polyfit(x, y, 1)[0])
@@ -152,5 +160,7 @@ def mean_modulus(
             f"{run.path}: {inside.sum()} rows of the history lie in the range of the modulus, at "
             "least 3 are needed (raise history_count)"
         )
+    if not corrected:
+        refuse_growing_loads(run, float(history["time"][np.flatnonzero(inside)[0]]))
     slope = float(np.polyfit(-history[name][inside], stress[inside], 1)[0])
     return Modulus((1.0 - ratio**2) * slope, slope, ratio, int(inside.sum()), strain_range)

@@ -16,6 +16,7 @@ from ..measure.band import LEVEL, BandMeasure, Line
 from ..measure.measures import frame_profile
 from ..read.errors import PostError, RequestError
 from ..read.fields import label_of
+from ..read.numerals import fixed
 from ..read.points import FloatArray
 from . import drawing as draw
 from .drawing import COMMON, Row
@@ -118,7 +119,7 @@ def _line(options: Mapping[str, Any]) -> Line | None:
 def _label(curve: _Curve, several: bool) -> str:
     width = curve.found.interpolated
     strain = f", {100.0 * curve.found.strain:.3g} %" if several else ""
-    return f"{curve.run.label}{strain}: {'' if width.closed else '≥ '}{width.width:.3f} m"
+    return f"{curve.run.label}{strain}: {'' if width.closed else '≥ '}{fixed(width.width, 3)} m"
 
 
 def _draw_profile(
