@@ -1,4 +1,4 @@
-"""make install: into an empty folder, used without the repository, taken away again."""
+"""make, and make install: into an empty folder, used without the repository, taken away again."""
 
 import os
 import shutil
@@ -23,6 +23,26 @@ def install(action, prefix, program, **settings):
     assert done.returncode == 0, done.stderr
     assert done.stderr == ""
     return done.stdout
+
+
+def make(*words):
+    """Call make as a user does; return the finished process."""
+    plain = {k: v for k, v in os.environ.items() if not k.startswith(("MAKE", "MFLAGS"))}
+    return subprocess.run(
+        ["make", *words], cwd=ROOT, env=plain, capture_output=True, text=True, check=False
+    )
+
+
+def test_plain_make_compiles_on_all_cores_unless_told():
+    assert f"-j{os.cpu_count()} program post" in make("-n").stdout
+    for told in ("-j1", "-j3"):
+        assert "-j" not in make("-n", told).stdout
+
+
+def test_make_without_a_compiler_names_the_set_up():
+    done = make("FC=no-such-compiler")
+    assert done.returncode == 2
+    assert "no Fortran compiler (no-such-compiler): `make setup` installs or names" in done.stderr
 
 
 def files(folder):
