@@ -62,6 +62,7 @@ UNITS = (
     (r"time(_step)?$", "s"),
     (r"\w+_force_[xy]$", "N/m"),
     (r"\w+_displacement_[xy]$", "m"),
+    (r"\w+_rotation$", "rad"),
     (r"mean_stress_", "Pa"),
     (r"\w+_(energy|dissipation|heat|work)$", "J/m"),
     (r"(step|strain|mean_strain_yy|max_plastic_strain|energy_error|min_det_f)$", "1"),
