@@ -54,12 +54,13 @@ COMMANDS: dict[str, tuple[_Setup, _Action, str, str]] = {
     ),
     "curves": (
         curves.add_options, curves.carry_out,
-        "stress-strain curves, energies, any column of the history",
+        "stress-strain curves, settlements, energies, any column of the history",
         """\
         perigeo-post curves run.h5 -o curve.pdf --mark 1% 1.3% 1.6%
         perigeo-post curves a.h5 b.h5 --labels "m = 3" "m = 4" --csv curves.csv
         perigeo-post curves run.h5 --energies --against time
-        perigeo-post curves run.h5 --x footing_displacement_y --y footing_force_y
+        perigeo-post curves run.h5 --settlement footing
+        perigeo-post curves run.h5 --x wall_displacement_x --y wall_force_x
         perigeo-post curves run.h5 --x time --y top_force_x top_force_y""",
     ),
     "contours": (
