@@ -95,11 +95,10 @@ COMMANDS: dict[str, tuple[_Setup, _Action, str, str]] = {
     ),
     "export": (
         export.add_options, export.carry_out,
-        "frames for other programs: VTU with PVD, CSV, XDMF for meshio",
+        "frames for other programs: VTU with PVD, or CSV",
         """\
         perigeo-post export run.h5
-        perigeo-post export run.h5 --format csv --strain 1% --field stress plastic_strain
-        perigeo-post export run.h5 --format xdmf -o .""",
+        perigeo-post export run.h5 --format csv --strain 1% --field stress plastic_strain""",
     ),
     "advise": (
         advise.add_options, advise.carry_out,
