@@ -125,33 +125,6 @@ def test_pages_say_what_help_says(prefix, perigeo, tmp_path):
         assert words in post
 
 
-@pytest.mark.parametrize(
-    ("line", "offered"),
-    [
-        ("perigeo --re", {"--restart"}),
-        ("perigeo --check ca", {"case.nml", "case/"}),
-        ("perigeo-post cu", {"curves"}),
-        ("perigeo-post curves run.h5 --pl", {"--platen"}),
-        ("perigeo-post curves --platen f", {"first"}),
-        ("perigeo-post curves ru", {"run.h5"}),
-    ],
-)
-def test_bash_completes(prefix, tmp_path, line, offered):
-    for name in ("case.nml", "case.txt", "run.h5", "run.log"):
-        (tmp_path / name).touch()
-    (tmp_path / "case").mkdir()
-    words = line.split(" ")
-    script = prefix / "share/bash-completion/completions" / words[0]
-    text = (
-        f"source '{script}'; COMP_WORDS=({line}); COMP_CWORD={len(words) - 1}; "
-        f"_{words[0].replace('-', '_')}; printf '%s\\n' \"${{COMPREPLY[@]}}\""
-    )
-    done = subprocess.run(
-        ["bash", "-c", text], cwd=tmp_path, capture_output=True, text=True, check=True
-    )
-    assert set(done.stdout.split()) == offered
-
-
 @pytest.mark.skipif(not shutil.which("man"), reason="no man")
 @pytest.mark.parametrize("name", ["perigeo", "perigeo-post"])
 def test_man_has_nothing_to_say_against_a_page(prefix, name):
