@@ -67,20 +67,21 @@ build    := build/$(BUILD)$(if $(MPI),-mpi)
 studies := fig3a fig3b fig4 fig5 seeds horizon loading size softening influence heterogeneity \
   zero_energy equilibrium
 # Targets that need no compiler, or see to it themselves.
-sets_up := setup uninstall wheel demo demo-quick test debug lint verify layers help clean \
-  distclean figures $(studies) report report-view gallery site site-view bench clouds \
+sets_up := all setup first-footing uninstall wheel demo demo-quick test debug lint verify layers \
+  help clean distclean figures $(studies) report report-view gallery site site-view bench clouds \
   finite_elements limit_loads mutants fuzz soak sanitize test_ranks scaling
-.PHONY: all program objects post units install $(sets_up)
+.PHONY: program objects post units install $(sets_up)
 .DEFAULT_GOAL := all
 
 help_width := 13
 
-all: program post  ## build bin/perigeo and install perigeo-post into .venv (the default)
-
 # Recursive calls compile on all cores unless the user has given -j.
 cores    := $(shell getconf _NPROCESSORS_ONLN 2>/dev/null || echo 2)
-parallel  = $(if $(findstring jobserver,$(MAKEFLAGS)),,-j$(cores))
+parallel  = $(if $(filter -j% --jobserver%,$(MAKEFLAGS)),,-j$(cores))
 submake   = $(MAKE) --no-print-directory
+
+all:               ## build bin/perigeo and install perigeo-post into .venv (the default)
+	+@$(submake) $(parallel) program post
 
 setup:             ## install what is missing: compiler, HDF5, Python packages in .venv
 	@sh tools/setup.sh run
@@ -150,6 +151,10 @@ gallery:           ## draw every kind of figure, in results/gallery; PUBLISH=1: 
 	@sh tools/setup.sh run
 	@$(submake) $(parallel) program
 	@$(venv)/bin/python tools/make_gallery.py $(if $(PUBLISH),--publish)
+
+first-footing:     ## type doc/first_footing.md in a fresh clone and time it; PUBLISH=1: its table
+	@sh tools/setup.sh run
+	@$(venv)/bin/python tools/first_footing.py $(if $(PUBLISH),--publish)
 
 site:              ## documents, tutorials, gallery and modules as pages: build/site/index.html
 	@sh tools/setup.sh site

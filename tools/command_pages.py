@@ -247,9 +247,11 @@ def zsh(command: Command) -> str:
 
     def arguments(part: Command) -> str:
         words = [word for option in part.options for word in argument(option)]
-        globs = "|".join(dict.fromkeys(f"*{ending}" for ending in part.files))
-        if globs:
-            words.append(f"'*:file:_files -g \"({globs})\"'")
+        endings = list(dict.fromkeys(ending[1:] for ending in part.files))
+        if endings:
+            # Brackets at the end of a pattern would be taken for what a file has to be.
+            glob = f"*.({'|'.join(endings)})" if len(endings) > 1 else f"*.{endings[0]}"
+            words.append(f"'*:file:_files -g \"{glob}(-.)\"'")
         return "_arguments " + " \\\n      ".join(words)
 
     lines = [f"#compdef {command.name}", f"# Completion of {command.name}; made from its --help."]
@@ -286,9 +288,12 @@ def fish(command: Command) -> str:
             )
             takes = ""
             if option.value:
-                takes = " -r"
-                if option.choices:
-                    takes = f" -x -a {quoted(' '.join(option.choices))}"
+                takes = {
+                    "words": f" -x -a {quoted(' '.join(option.choices))}",
+                    "folder": " -x -a '(__fish_complete_directories)'",
+                    "file": " -r",
+                    "any": " -x",
+                }[kind(option)]
             found.append(f"{start}{condition} {flags}{takes} -d {quoted(option.meaning)}")
         return found
 

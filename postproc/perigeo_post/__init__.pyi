@@ -27,6 +27,7 @@ from .measure.curves import curve_numbers as curve_numbers
 from .measure.curves import energy_curves as energy_curves
 from .measure.curves import history_curve as history_curve
 from .measure.curves import peak as peak
+from .measure.curves import settlement_curves as settlement_curves
 from .measure.curves import stress_strain as stress_strain
 from .measure.export import to_json as to_json
 from .measure.export import write_bands as write_bands

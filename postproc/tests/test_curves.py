@@ -16,9 +16,11 @@ from perigeo_post import (
     apparent_modulus,
     axial_stress,
     compare_runs,
+    curve_figure,
     energy_curves,
     history_curve,
     peak,
+    settlement_curves,
     stress_strain,
     write_curves,
 )
@@ -63,6 +65,26 @@ def test_any_column_goes_against_any_other(result: Path) -> None:
     assert (curve.x_unit, curve.y_unit) == ("s", "1")
     assert history_curve(Run(result), "external_work").x_name == "strain"
     assert len(energy_curves(Run(result))) == 6
+
+
+def test_a_settlement_goes_down_with_the_load(result: Path) -> None:
+    path = result.with_name("made_history.csv")
+    rows = [line.split(",") for line in path.read_text().splitlines()]
+    rows[0].append("top_displacement_y")
+    for k, row in enumerate(rows[1:]):
+        row.append(f"{-1e-3 * k:.6g}")
+    path.write_text("\n".join(",".join(row) for row in rows) + "\n")
+    run = Run(result)
+    (curve,) = settlement_curves([run], "top")
+    assert (curve.x_name, curve.y_name) == ("top_load", "top_settlement")
+    assert curve.x == pytest.approx(-run.history()["top_force_y"])
+    assert curve.y == pytest.approx(1e-3 * np.arange(len(curve.y)))
+    (axes,) = curve_figure([curve]).axes
+    low, high = axes.get_ylim()
+    assert low > high  # downwards
+    assert axes.xaxis.get_label_position() == "top"
+    with pytest.raises(RequestError, match="no boundary 'tip': bottom, top"):
+        settlement_curves([run], "tip")
 
 
 def test_without_platens_there_is_no_axial_stress(cloud: Path) -> None:

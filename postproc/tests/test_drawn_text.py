@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,18 +11,25 @@ import pytest
 import synthetic
 from drawn_text import faults
 from matplotlib.figure import Figure
+from PIL import Image
 
+import perigeo_post
 from perigeo_post import (
     Run,
+    animate,
     band_figure,
+    column_figure,
     compare_figure,
     contour_figure,
+    curve_figure,
     energy_figure,
     measure_band,
     profile_figure,
     save_figure,
+    stress_strain,
     stress_strain_figure,
 )
+from perigeo_post.draw import animation
 from perigeo_post.draw.geometry import geometry_figure
 from perigeo_post.draw.style import new_figure, prefix_for, style
 from perigeo_post.draw.text import fit_numbers
@@ -92,6 +100,30 @@ def test_text_has_room_beside_every_body(width: float, height: float, tmp_path: 
     assert not {name: words for name, words in said.items() if words}
 
 
+@pytest.mark.parametrize(("width", "height"), [(10.0, 1.0), (0.0014, 0.001), (1.0, 10.0)])
+def test_text_has_room_in_every_picture_of_a_film(
+    width: float, height: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    said: list[list[str]] = []
+    rendered = animation._rendered
+
+    def look(figure: Figure) -> Image.Image:
+        said.append(faults(figure))
+        return rendered(figure)
+
+    monkeypatch.setattr(animation, "_rendered", look)
+    animate(body(tmp_path, width, height).frames(), tmp_path / "film.gif", "stress_xy", 10.0)
+    assert said == [[]] * 4
+
+
+def test_every_figure_has_its_text_looked_at() -> None:
+    """Functions that give a figure: all of them are drawn in this file."""
+    source = Path(__file__).read_text(encoding="utf-8")
+    makers = [name for name in perigeo_post.__all__ if name.endswith("_figure")]
+    assert len(makers) > 7
+    assert not [name for name in makers if f"{name}(" not in source]
+
+
 def test_text_has_room_in_every_figure_of_curves(result: Path) -> None:
     run = Run(result)
     runs = study_runs(run)
@@ -105,8 +137,17 @@ def test_text_has_room_in_every_figure_of_curves(result: Path) -> None:
         "energies": lambda: energy_figure(run),
         "profiles": lambda: profile_figure([found] * 3, ["a rather long label", "b", "c"]),
     }
+    settled = [
+        replace(stress_strain(run, label=f"a label of words {k}"), y_name="a_footing_settlement",
+                x_name="a_footing_load", y_unit="m", x_unit="N/m", downwards=True)
+        for k in range(5)
+    ]  # fmt: skip
+    figures["settlement"] = lambda: curve_figure(settled[:1])
+    figures["settlements"] = lambda: curve_figure(settled)
+    figures["column"] = lambda: column_figure([run, run], "max_plastic_strain", "time")
     options = {"plot": {"x": "p", "y": "width"}, "curves": {"by": "p"}, "profiles": {},
-               "quality": {}}  # fmt: skip
+               "quality": {}, "history": {"y": "max_plastic_strain"}}  # fmt: skip
+    assert {*options, "contours"} == set(FIGURES)  # contours: beside every body
     for kind, chosen in options.items():
         figures[f"study {kind}"] = lambda k=kind, o=chosen: FIGURES[k](runs, o, columns).figure
     said = {name: faults(draw()) for name, draw in figures.items()}

@@ -1,4 +1,4 @@
-"""Results for other programs: VTU, PVD, CSV, XDMF for meshio, xarray; and how objects show."""
+"""Results for other programs: VTU, PVD, CSV, xarray; and how objects show."""
 
 from __future__ import annotations
 
@@ -54,42 +54,18 @@ def test_a_table_has_units_and_all_components(result: Path, tmp_path: Path) -> N
     assert values[:, 7] == pytest.approx(Run(result).frame(0.01)["stress_xy"], rel=1e-11)
 
 
-def test_the_file_for_meshio_names_data_sets_of_the_result(result: Path, tmp_path: Path) -> None:
-    """What meshio asks for: plain items, each the path of a whole data set, and a topology."""
-    assert main(["export", str(result), "--format", "xdmf", "-o", str(tmp_path / "sub")]) == 0
-    path = tmp_path / "sub" / "made_meshio.xdmf"
-    root = ElementTree.parse(path).getroot()
-    assert root.get("Version") == "3.0"
-    items = [item for item in root.iter("DataItem") if item.get("Format") == "HDF"]
-    assert len(items) == 1 + 4 * 7
-    with h5py.File(result, "r") as file:
-        for item in items:
-            name, _, key = str(item.text).partition(":")
-            assert (path.parent / name).resolve() == result.resolve()
-            assert list(file[key].shape) == [int(n) for n in str(item.get("Dimensions")).split()]
-    meshio = pytest.importorskip("meshio")
-    with meshio.xdmf.TimeSeriesReader(path) as reader:
-        points, _ = reader.read_points_cells()
-        time, fields, _ = reader.read_data(2)
-    frame = Run(result).frames()[2]
-    assert (time, len(points)) == (frame.time, len(frame.run.volumes))
-    assert np.array_equal(fields["stress"], frame["stress"])
-
-
-@pytest.mark.parametrize("form", ["vtu", "xdmf"])
 def test_export_replaces_its_like_and_nothing_else(
-    result: Path, tmp_path: Path, form: str, capsys: pytest.CaptureFixture[str]
+    result: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     folder = tmp_path / "out"
-    given = ["export", str(result), "--format", form, "-o", str(folder)]
+    given = ["export", str(result), "-o", str(folder)]
     assert main(given) == 0
     assert main(given) == 0
-    made = next(path for path in folder.iterdir() if path.suffix in (".vtu", ".xdmf"))
-    if form == "vtu":
-        made.write_text("my notes, not a result\n")
-        assert main(given) != 0
-        assert "not overwritten" in capsys.readouterr().err
-        assert made.read_text() == "my notes, not a result\n"
+    made = next(path for path in folder.iterdir() if path.suffix == ".vtu")
+    made.write_text("my notes, not a result\n")
+    assert main(given) != 0
+    assert "not overwritten" in capsys.readouterr().err
+    assert made.read_text() == "my notes, not a result\n"
 
 
 def test_what_cannot_be_exported_is_named(

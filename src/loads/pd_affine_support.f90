@@ -15,6 +15,7 @@ module pd_affine_support
 
   type, extends(support_t) :: affine_support_t
     type(table_t), private :: factor                     !! rate of a
+    real(wp), private :: gradient(4) = 0.0_wp            !! L xx xy yx yy [1/s]
     real(wp), allocatable, private :: mode(:, :)         !! L X (2, its points) [m/s]
     real(wp), private :: mass = 0.0_wp                   !! rho sum V |L X|^2 [J/m]
     real(wp), private :: mode_force = 0.0_wp             !! conjugate to a [W/m]
@@ -25,6 +26,8 @@ module pd_affine_support
     procedure :: add_up
     procedure :: take_reactions
     procedure :: work
+    procedure :: turns
+    procedure :: rotation
   end type affine_support_t
 
 contains
@@ -41,6 +44,7 @@ contains
 
     call support%hold(set)
     support%factor = factor
+    support%gradient = gradient
     allocate (support%mode(2, size(set%points)))
     do k = 1, size(set%points)
       associate (x => position(set%points(k), :), m => support%mode(:, k))
@@ -111,5 +115,24 @@ contains
       * (self%factor%integral(t_next) - self%factor%integral(t)) &
       + 0.5_wp * self%mass * (self%factor%rate(t_next)**2 - self%factor%rate(t)**2)
   end function work
+
+  !> A gradient that is symmetric stretches without turning.
+  pure logical function turns(self)
+    class(affine_support_t), intent(in) :: self
+
+    turns = abs(self%gradient(3) - self%gradient(2)) > 0.0_wp
+  end function turns
+
+  !> The angle of R in F = R U with F = I + a L.
+  pure real(wp) function rotation(self, t)
+    class(affine_support_t), intent(in) :: self
+    real(wp),                intent(in) :: t
+    real(wp) :: a
+
+    a = self%factor%integral(t)
+    associate (l => self%gradient)
+      rotation = atan2(a * (l(3) - l(2)), 2.0_wp + a * (l(1) + l(4)))
+    end associate
+  end function rotation
 
 end module pd_affine_support

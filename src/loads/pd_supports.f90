@@ -35,6 +35,8 @@ module pd_supports
     procedure :: mark_read => mark_points
     procedure :: common_velocity => no_common_velocity
     procedure :: applied => nothing_applied
+    procedure :: turns => never
+    procedure :: rotation => no_rotation
     procedure :: description => nothing_to_say
   end type support_t
 
@@ -173,6 +175,25 @@ contains
     end associate
     force = 0.0_wp
   end function nothing_applied
+
+  !> Whether the support turns its points as its motion goes on.
+  pure logical function never(self) result(turns)
+    class(support_t), intent(in) :: self
+
+    associate (unused => self)
+    end associate
+    turns = .false.
+  end function never
+
+  !> Rotation of the points of the support at time t, positive from x to y [rad].
+  pure real(wp) function no_rotation(self, t) result(rotation)
+    class(support_t), intent(in) :: self
+    real(wp),         intent(in) :: t                 !! [s]
+
+    associate (unused => self, unused_t => t)
+    end associate
+    rotation = 0.0_wp
+  end function no_rotation
 
   !> What `--check` says about the load on a support; '' if there is none.
   pure function nothing_to_say(self) result(text)

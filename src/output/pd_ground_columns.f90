@@ -22,12 +22,15 @@ contains
     integer :: c, k
 
     do k = 1, size(model%supports%items)
-      associate (name => model%supports%items(k)%support%name)
+      associate (support => model%supports%items(k)%support)
         do c = 1, 2
-          columns = [columns, column_t(trim(name)//'_displacement_'//axes(c), 'm', axes(c)// &
-            '-component of the mean displacement of the points of the boundary '//trim(name), &
-            value=boundary_displacement, boundary=k, component=c)]
+          columns = [columns, column_t(trim(support%name)//'_displacement_'//axes(c), 'm', &
+            axes(c)//'-component of the mean displacement of the points of the boundary '// &
+            trim(support%name), value=boundary_displacement, boundary=k, component=c)]
         end do
+        if (support%turns()) columns = [columns, column_t(trim(support%name)//'_rotation', &
+          'rad', 'rotation of the boundary '//trim(support%name)//', positive from x to y', &
+          value=boundary_rotation, boundary=k)]
       end associate
     end do
     do k = 1, model%loads%count()
@@ -78,6 +81,12 @@ contains
       if (mirror%normal(plane) == row%component) value = mirror%place(plane)
     end associate
   end function boundary_displacement
+
+  pure real(wp) function boundary_rotation(row) result(value)
+    type(row_view_t), intent(in) :: row
+
+    value = row%model%supports%items(row%boundary)%support%rotation(row%moment%time)
+  end function boundary_rotation
 
   pure real(wp) function gravity(row) result(value)
     type(row_view_t), intent(in) :: row

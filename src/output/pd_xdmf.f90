@@ -1,8 +1,13 @@
-!> The XDMF file of a result file: ParaView needs it to open the result.
+!> The XDMF file of a result file: ParaView, pyvista and meshio open the result by it.
 !>
 !> It holds no numbers, only their paths in the HDF5 file, which is named without a folder so that
-!> both can be moved together. Vectors in the plane get a third component 0, which ParaView's
-!> filters (warp, glyph) ask for; tensors become one scalar per component.
+!> both can be moved together. All readers take whole data sets alone, so there is one attribute
+!> for each. Readers of VTK give a vector of two components the third that their filters ask for.
+!> Those of some versions take the components of a matrix from all dimensions but the first, those
+!> of others from the last: a tensor is therefore said to be of 1 x 4 numbers at every point.
+!>
+!> Besides, VTK gets one scalar per component of a tensor, by name. meshio can read no part of a
+!> data set, and would give up: these attributes stand in a name space, which VTK disregards.
 !>
 !> Behind its end there is room for all frames, in blanks, which XML ignores there. A frame is
 !> written over the end, with a new end behind it, in one call of the operating system: the cost of
@@ -20,8 +25,9 @@ module pd_xdmf
   public :: xdmf_t, new_xdmf
 
   character(*), parameter :: nl = new_line('a')
-  character(*), parameter :: head = '<?xml version="1.0" ?>'//nl//'<Xdmf Version="2.0">'//nl// &
-    '<Domain>'//nl//'<Grid Name="frames" GridType="Collection" CollectionType="Temporal">'//nl
+  character(*), parameter :: head = '<?xml version="1.0" ?>'//nl//'<Xdmf Version="3.0" '// &
+    'xmlns:component="urn:perigeo:component">'//nl//'<Domain>'//nl// &
+    '<Grid Name="frames" GridType="Collection" CollectionType="Temporal">'//nl
   character(*), parameter :: tail = '</Grid>'//nl//'</Domain>'//nl//'</Xdmf>'//nl
 
   !> The XDMF file of a result that is being written.
@@ -147,7 +153,8 @@ contains
     text = '<Grid Name="'//group//'" GridType="Uniform">'//nl &
       //'<Time Value="'//trim(adjustl(time))//'"/>'//nl &
       //'<Topology TopologyType="Polyvertex" NodesPerElement="1" NumberOfElements="'//n &
-      //'"/>'//nl//'<Geometry GeometryType="XY">'//nl &
+      //'">'//nl//whole_item(source//'number', n//' 1', 'Int', 4)//'</Topology>'//nl &
+      //'<Geometry GeometryType="XY">'//nl &
       //whole_item(source//'position', n//' 2', 'Float', 8)//'</Geometry>'//nl &
       //attribute('volume', 'Scalar', whole_item(source//'volume', n, 'Float', 8)) &
       //attribute('boundary', 'Scalar', whole_item(source//'boundary', n, 'Int', 4))
@@ -165,30 +172,33 @@ contains
     character(*),  intent(in) :: source
     integer,       intent(in) :: n
     type(field_label_t), intent(in) :: field
-    character(:), allocatable :: text
+    character(:), allocatable :: text, points
     integer :: c
 
+    points = integer_text(n)
     if (field%width() == 1) then
-      text = attribute(trim(field%name), 'Scalar', whole_item(source, integer_text(n), 'Float', 8))
+      text = attribute(trim(field%name), 'Scalar', whole_item(source, points, 'Float', 8))
     else if (field%width() == 2) then
-      text = attribute(trim(field%name), 'Vector', '<DataItem ItemType="Function" ' &
-        //'Function="JOIN($0, $1, 0 * $1)" Dimensions="'//integer_text(n)//' 3">'//nl &
-        //column_item(source, n, 2, 1)//column_item(source, n, 2, 2)//'</DataItem>'//nl)
+      text = attribute(trim(field%name), 'Vector', whole_item(source, points//' 2', 'Float', 8))
     else
-      text = ''
+      text = attribute(trim(field%name), 'Matrix', whole_item(source, &
+        points//' 1 '//integer_text(field%width()), 'Float', 8))
       do c = 1, field%width()
         text = text//attribute(trim(field%name)//'_'//field%component(c), 'Scalar', &
-          column_item(source, n, field%width(), c))
+          column_item(source, n, field%width(), c), 'component:')
       end do
     end if
   end function field_text
 
-  pure function attribute(name, kind_of_field, item) result(text)
+  pure function attribute(name, kind_of_field, item, name_space) result(text)
     character(*), intent(in) :: name, kind_of_field, item
-    character(:), allocatable :: text
+    character(*), intent(in), optional :: name_space
+    character(:), allocatable :: text, tag
 
-    text = '<Attribute Name="'//name//'" AttributeType="'//kind_of_field//'" Center="Node">'//nl &
-      //item//'</Attribute>'//nl
+    tag = 'Attribute'
+    if (present(name_space)) tag = name_space//tag
+    text = '<'//tag//' Name="'//name//'" AttributeType="'//kind_of_field//'" Center="Node">'//nl &
+      //item//'</'//tag//'>'//nl
   end function attribute
 
   pure function whole_item(source, dimensions, number_type, bytes) result(text)

@@ -1,10 +1,14 @@
 """Gravity, initial stress, gradients, probes: closed forms, rest, restart, bits, what is said."""
 
+from pathlib import Path
+
 import h5py
 import numpy as np
 import pytest
 from case_files import history, same_points_and_frames
 from test_loads import stopped
+
+ROOT = Path(__file__).resolve().parents[2]
 
 GAMMA, K0 = 2.0e4, 0.5
 COLUMN = """\
@@ -216,6 +220,21 @@ def test_soil_yields_where_its_strength_says(results):
     used = fields["von_mises"][flows] / fields["yield_stress"][flows]
     assert used.max() == pytest.approx(1.0, rel=1e-9)
     assert np.mean(used > 1.0 - 1e-9) > 0.9  # the rest has come to rest again
+
+
+def test_a_boundary_that_turns_tells_by_how_much(perigeo, tmp_path):
+    wall = ROOT / "input" / "limit_loads" / "wall_rotation.nml"
+    coarse = ("spacing=0.1", "horizon=0.3")
+    settings = [f"discretisation.{word}" for word in coarse]
+    settings += ["integration.increments=10", "integration.residual=1e-2", "run.name=case"]
+    words = [word for text in settings for word in ("--set", text)]
+    done = perigeo(["--quiet", "--output", "out", *words, wall], tmp_path)
+    assert done.returncode == 0, done.stderr
+    rows = history(tmp_path / "out" / "case_history.csv")
+    gone = 0.01 * np.maximum(rows["time"] - 1.0, 0.0)  # of the tangent, clockwise
+    assert rows["wall_rotation"] == pytest.approx(-np.arctan(gone), abs=1e-8)
+    assert rows["wall_rotation"][-1] < -0.03
+    assert [name for name in rows if name.endswith("_rotation")] == ["wall_rotation"]
 
 
 def test_probes_tell_what_frames_hold(results, run_case, tmp_path):

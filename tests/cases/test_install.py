@@ -1,4 +1,4 @@
-"""make install: into an empty folder, used without the repository, taken away again."""
+"""make, and make install: into an empty folder, used without the repository, taken away again."""
 
 import os
 import shutil
@@ -23,6 +23,26 @@ def install(action, prefix, program, **settings):
     assert done.returncode == 0, done.stderr
     assert done.stderr == ""
     return done.stdout
+
+
+def make(*words):
+    """Call make as a user does; return the finished process."""
+    plain = {k: v for k, v in os.environ.items() if not k.startswith(("MAKE", "MFLAGS"))}
+    return subprocess.run(
+        ["make", *words], cwd=ROOT, env=plain, capture_output=True, text=True, check=False
+    )
+
+
+def test_plain_make_compiles_on_all_cores_unless_told():
+    assert f"-j{os.cpu_count()} program post" in make("-n").stdout
+    for told in ("-j1", "-j3"):
+        assert "-j" not in make("-n", told).stdout
+
+
+def test_make_without_a_compiler_names_the_set_up():
+    done = make("FC=no-such-compiler")
+    assert done.returncode == 2
+    assert "no Fortran compiler (no-such-compiler): `make setup` installs or names" in done.stderr
 
 
 def files(folder):
@@ -103,33 +123,6 @@ def test_pages_say_what_help_says(prefix, perigeo, tmp_path):
     post = (prefix / "share/man/man1/perigeo-post.1").read_text().replace("\\-", "-")
     for words in ("perigeo-post advise", "--platen", "perigeo-post study studies/horizon.toml"):
         assert words in post
-
-
-@pytest.mark.parametrize(
-    ("line", "offered"),
-    [
-        ("perigeo --re", {"--restart"}),
-        ("perigeo --check ca", {"case.nml", "case/"}),
-        ("perigeo-post cu", {"curves"}),
-        ("perigeo-post curves run.h5 --pl", {"--platen"}),
-        ("perigeo-post curves --platen f", {"first"}),
-        ("perigeo-post curves ru", {"run.h5"}),
-    ],
-)
-def test_bash_completes(prefix, tmp_path, line, offered):
-    for name in ("case.nml", "case.txt", "run.h5", "run.log"):
-        (tmp_path / name).touch()
-    (tmp_path / "case").mkdir()
-    words = line.split(" ")
-    script = prefix / "share/bash-completion/completions" / words[0]
-    text = (
-        f"source '{script}'; COMP_WORDS=({line}); COMP_CWORD={len(words) - 1}; "
-        f"_{words[0].replace('-', '_')}; printf '%s\\n' \"${{COMPREPLY[@]}}\""
-    )
-    done = subprocess.run(
-        ["bash", "-c", text], cwd=tmp_path, capture_output=True, text=True, check=True
-    )
-    assert set(done.stdout.split()) == offered
 
 
 @pytest.mark.skipif(not shutil.which("man"), reason="no man")

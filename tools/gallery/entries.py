@@ -37,9 +37,11 @@ SECTIONS: dict[str, list[Entry]] = {
               post("compression", "curves @ --mark 1% 1.3% 1.6%")),
         Entry("energies", "Where the work goes: stored, plastic, kinetic, damping.", "compression",
               post("compression", "curves @ --energies")),
-        Entry("settlement", "Load against settlement of a strip footing: any column of the "
-              "history against any other.", "strip_footing",
-              post("strip_footing", "curves @ --x footing_displacement_y --y footing_force_y")),
+        Entry("settlement", "Settlement of a strip footing against its load, as engineers draw "
+              "it.", "strip_footing", post("strip_footing", "curves @ --settlement footing")),
+        Entry("columns", "Any columns of the history against any other: forces on the footing and "
+              "on the base.", "strip_footing",
+              post("strip_footing", "curves @ --x time --y footing_force_y base_force_y")),
     ],
     "Fields: `perigeo-post contours`": [
         Entry("../compression", "Plastic strain at three states, on one colour scale.",

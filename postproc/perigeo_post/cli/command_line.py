@@ -54,12 +54,13 @@ COMMANDS: dict[str, tuple[_Setup, _Action, str, str]] = {
     ),
     "curves": (
         curves.add_options, curves.carry_out,
-        "stress-strain curves, energies, any column of the history",
+        "stress-strain curves, settlements, energies, any column of the history",
         """\
         perigeo-post curves run.h5 -o curve.pdf --mark 1% 1.3% 1.6%
         perigeo-post curves a.h5 b.h5 --labels "m = 3" "m = 4" --csv curves.csv
         perigeo-post curves run.h5 --energies --against time
-        perigeo-post curves run.h5 --x footing_displacement_y --y footing_force_y
+        perigeo-post curves run.h5 --settlement footing
+        perigeo-post curves run.h5 --x wall_displacement_x --y wall_force_x
         perigeo-post curves run.h5 --x time --y top_force_x top_force_y""",
     ),
     "contours": (
@@ -94,11 +95,10 @@ COMMANDS: dict[str, tuple[_Setup, _Action, str, str]] = {
     ),
     "export": (
         export.add_options, export.carry_out,
-        "frames for other programs: VTU with PVD, CSV, XDMF for meshio",
+        "frames for other programs: VTU with PVD, or CSV",
         """\
         perigeo-post export run.h5
-        perigeo-post export run.h5 --format csv --strain 1% --field stress plastic_strain
-        perigeo-post export run.h5 --format xdmf -o .""",
+        perigeo-post export run.h5 --format csv --strain 1% --field stress plastic_strain""",
     ),
     "advise": (
         advise.add_options, advise.carry_out,

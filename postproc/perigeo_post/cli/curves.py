@@ -1,4 +1,4 @@
-"""`perigeo-post curves`: stress-strain curves, energies, columns of the history."""
+"""`perigeo-post curves`: stress-strain curves, settlements, energies, columns of the history."""
 
 from __future__ import annotations
 
@@ -6,7 +6,14 @@ import argparse
 from typing import Any
 
 from ..measure import export, measures
-from ..measure.curves import Curve, column_curves, curve_numbers, energy_curves, stress_strain
+from ..measure.curves import (
+    Curve,
+    column_curves,
+    curve_numbers,
+    energy_curves,
+    settlement_curves,
+    stress_strain,
+)
 from ..read.errors import RequestError
 from ..read.run import Run
 from .options import (
@@ -34,6 +41,10 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         "them",
     )  # fmt: skip
     what.add_argument("--column", metavar="NAME", help="the same, one column")
+    what.add_argument(
+        "--settlement", metavar="BOUNDARY",
+        help="settlement of a boundary, downwards, against the load on it, as of a footing",
+    )  # fmt: skip
     what.add_argument("--energies", action="store_true", help="all energies of one run")
     parser.add_argument(
         "--x", "--against", metavar="NAME", dest="x",
@@ -51,7 +62,7 @@ def carry_out(args: Arguments) -> None:
     runs = [Run(path) for path in args.files]
     names = measures.labels_for(runs, args.labels)
     columns = [args.column] if args.column else args.y
-    plain = not args.energies and not columns
+    plain = not args.energies and not columns and not args.settlement
     curves: list[Curve] = []
     if args.energies:
         if len(runs) > 1:
@@ -61,6 +72,8 @@ def carry_out(args: Arguments) -> None:
         curves = column_curves(runs, columns, args.x, names)
     elif args.x:
         raise RequestError("--x goes with --y or --energies")
+    elif args.settlement:
+        curves = settlement_curves(runs, args.settlement, names)
     else:
         curves = [
             stress_strain(r, args.tension_positive, args.platen, n) for r, n in zip(runs, names)
@@ -92,4 +105,6 @@ def carry_out(args: Arguments) -> None:
         return figures.curve_figure(curves, label)
 
     kind = "energies" if args.energies else columns[0] if columns else "curves"
+    if args.settlement:
+        kind = f"{args.settlement}_settlement"
     draw_figure(args, args.files[0], kind, draw)

@@ -1,4 +1,4 @@
-"""`perigeo-post export`: frames for other programs, as VTU, CSV, or an XDMF for meshio."""
+"""`perigeo-post export`: frames for other programs, as VTU or CSV."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ from .options import Arguments, add_files, add_state
 def add_options(parser: argparse.ArgumentParser) -> None:
     add_files(parser, many=False)
     parser.add_argument(
-        "--format", choices=["vtu", "csv", "xdmf"], default="vtu",
+        "--format", choices=["vtu", "csv"], default="vtu",
         help="vtu: a file for each frame and a .pvd that ParaView opens (default); csv: a table "
-        "for each frame; xdmf: one small file that meshio reads, the numbers stay in FILE.h5",
+        "for each frame",
     )  # fmt: skip
     parser.add_argument("-o", "--output", metavar="DIR", type=Path,
                         help="folder to write to (default: NAME_export beside it)")  # fmt: skip
@@ -39,8 +39,6 @@ def carry_out(args: Arguments) -> None:
             export.write_frame(folder / f"{run.name}_{frame.number or 0:06d}.csv", frame, names)
             for frame in frames
         ]
-    elif args.format == "xdmf":
-        paths = vtk_files.write_xdmf(folder, run, frames, names)
     else:
         paths = vtk_files.write_vtu(folder, run, frames, names)
     print(f"wrote {paths[0]}" + (f" and {len(paths) - 1} more" if len(paths) > 1 else ""))

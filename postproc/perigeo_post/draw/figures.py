@@ -87,6 +87,10 @@ def draw_curves(
     ax.set_ylabel("\n".join(wrapped(name, AXIS_WORDS, 8.0)))
     ax.grid(True, linewidth=0.3, color="0.85")
     ax.set_axisbelow(True)
+    if first.downwards:
+        ax.invert_yaxis()
+        ax.xaxis.tick_top()
+        ax.xaxis.set_label_position("top")
     if place is not None:
         legend(ax, place)
 

@@ -1,4 +1,7 @@
-"""Legends: inside the axes where there is room, else above or beside them."""
+"""Legends: inside the axes where there is room, else above or beside them.
+
+Above is below where the numbers of the horizontal axis stand above.
+"""
 
 from __future__ import annotations
 
@@ -66,7 +69,10 @@ def legend(ax: Axes, place: LegendPlace, title: str = "") -> None:
         "title": title or None, "title_fontsize": 7, "handlelength": 2.4,
     }  # fmt: skip
     columns = place.columns if place.where == "above" else _columns(labels, place.width) or 1
-    above: dict[str, Any] = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0), "ncols": columns}
+    outside = ("lower center", (0.5, 1.0))
+    if ax.xaxis.get_label_position() == "top":
+        outside = ("upper center", (0.5, 0.0))
+    above: dict[str, Any] = {"loc": outside[0], "bbox_to_anchor": outside[1], "ncols": columns}
     if place.where == "aside":
         columns = 2 if len(labels) > NO_LEGEND_OVER else 1
         ax.legend(

@@ -30,6 +30,7 @@ class Curve(Short):
     y_name: str
     y_unit: str
     tension_positive: bool = False
+    downwards: bool = False  # y is drawn downwards
 
     def toward(self, strain: float) -> float:
         """The x of a strain that is given without a sign: in the direction of loading.
@@ -148,6 +149,32 @@ def column_curves(
         raise RequestError(f"columns of different units in one figure: {', '.join(units)}")
     if len({c.x_name for c in found}) > 1:
         raise RequestError("some runs have a strain and some have none: say --x time")
+    return found
+
+
+def settlement_curves(
+    runs: Sequence[Run], boundary: str, labels: Sequence[str] | None = None
+) -> list[Curve]:
+    """Settlement of a boundary against the load on it, both positive downwards."""
+    found = []
+    for run, name in zip(runs, labels or [label_of_run(run) for run in runs]):
+        history = run.history()
+        force, way = f"{boundary}_force_y", f"{boundary}_displacement_y"
+        there = [column[: -len("_force_y")] for column in history if column.endswith("_force_y")]
+        if boundary not in there:
+            raise RequestError(f"{run.path} has no boundary {boundary!r}: {', '.join(there)}")
+        found.append(
+            Curve(
+                name,
+                0.0 - history[force],
+                0.0 - history[way],
+                f"{boundary}_load",
+                history.unit(force),
+                f"{boundary}_settlement",
+                history.unit(way),
+                downwards=True,
+            )
+        )
     return found
 
 

@@ -1,9 +1,8 @@
-"""Frames as files of other programs: VTU with PVD for VTK, XDMF 3 for meshio."""
+"""Frames as files of other programs: VTU with PVD."""
 
 from __future__ import annotations
 
 import base64
-import os
 from collections.abc import Sequence
 from pathlib import Path
 from xml.sax.saxutils import quoteattr
@@ -12,8 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ..read.errors import OutputError
-from ..read.fields import Field, unknown
-from ..read.file import dataset
+from ..read.fields import Field
 from ..read.outputs import FIELDS, check_output
 from ..read.run import Frame, Run
 
@@ -41,60 +39,6 @@ def write_vtu(folder: Path, run: Run, frames: Sequence[Frame], names: Sequence[s
         *lines, "</Collection>", "</VTKFile>", "",
     ]))  # fmt: skip
     return [series, *paths]
-
-
-def write_xdmf(folder: Path, run: Run, frames: Sequence[Frame], names: Sequence[str]) -> list[Path]:
-    """An XDMF 3 file that meshio reads as a series in time; the numbers stay in the result file.
-
-    ParaView and VTK have the file that the program writes: meshio knows none of its constructions
-    for vectors with three components.
-    """
-    path = folder / f"{run.name}_meshio.xdmf"
-    source = Path(_relative(run.path, folder)).as_posix()
-    points = len(run.volumes)
-    numbers = " ".join(map(str, range(points)))
-    lines = [
-        '<?xml version="1.0"?>', '<Xdmf Version="3.0">', "<Domain>",
-        '<Grid Name="mesh" GridType="Uniform">',
-        f'<Topology TopologyType="Polyvertex" NodesPerElement="1" NumberOfElements="{points}">',
-        f'<DataItem Dimensions="{points} 1" DataType="Int" Precision="8" Format="XML">{numbers}'
-        "</DataItem>", "</Topology>", '<Geometry GeometryType="XY">',
-        _item(f"{source}:/points/position", (points, 2)), "</Geometry>", "</Grid>",
-        '<Grid Name="frames" GridType="Collection" CollectionType="Temporal">',
-    ]  # fmt: skip
-    for frame in frames:
-        lines += [f'<Grid Name="{_number(frame)}" GridType="Uniform">',
-                  f'<Time Value="{frame.time!r}"/>']  # fmt: skip
-        for name in names:
-            key, shape = _place_of(frame, name)
-            kind = {1: "Scalar", 2: "Matrix"}[len(shape)]
-            lines += [f'<Attribute Name={quoteattr(name)} AttributeType="{kind}" Center="Node">',
-                      _item(f"{source}:/{key}", shape), "</Attribute>"]  # fmt: skip
-        lines.append("</Grid>")
-    lines += ["</Grid>", "</Domain>", "</Xdmf>", ""]
-    _write(path, "\n".join(lines))
-    return [path]
-
-
-def _place_of(frame: Frame, name: str) -> tuple[str, tuple[int, ...]]:
-    """Path of a stored field in the result file, and its shape."""
-    run = frame.run
-    for key in (f"{frame.key}/{name}", f"points/{name}"):
-        found = dataset(run.path, key, name, len(run.volumes))
-        if found is not None:
-            return key, found.values.shape
-    raise unknown(name, list(run.stored_fields))
-
-
-def _item(place: str, shape: tuple[int, ...]) -> str:
-    size = " ".join(map(str, shape))
-    text = place.replace("&", "&amp;").replace("<", "&lt;")
-    start = f'<DataItem Dimensions="{size}" DataType="Float" Precision="8" Format="HDF">'
-    return f"{start}{text}</DataItem>"
-
-
-def _relative(path: Path, folder: Path) -> str:
-    return os.path.relpath(path.resolve(), folder.resolve())
 
 
 def _number(frame: Frame) -> str:

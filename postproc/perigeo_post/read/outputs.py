@@ -22,7 +22,7 @@ _HEAD = 65536  # bytes of a file that are looked at
 FIGURE = "figure"
 TABLE = "table"
 PAGE = "page"
-FIELDS = "file of fields"  # for other programs: VTU, PVD, XDMF of `export`
+FIELDS = "file of fields"  # for other programs: VTU and PVD of `export`
 
 
 def check_output(path: str | Path, kind: str, inputs: Iterable[str | Path] = ()) -> Path:
@@ -68,7 +68,7 @@ def _kind_of(head: bytes, path: Path) -> str:
         return FIGURE
     if head.lstrip().startswith(b"<?xml") and b"<svg" in head:
         return FIGURE
-    if b"<VTKFile" in head or path.name.endswith("_meshio.xdmf"):
+    if b"<VTKFile" in head:
         return FIELDS
     if head.lstrip().lower().startswith(b"<!doctype html"):
         return PAGE
