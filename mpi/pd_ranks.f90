@@ -25,7 +25,6 @@ module pd_ranks
     integer, allocatable :: before(:)   !! blocks before those of each rank, and all (0:count)
   contains
     procedure :: total
-    procedure :: running_total
     procedure :: largest
     procedure :: smallest
     procedure :: lowest_number
@@ -84,25 +83,6 @@ contains
 
     total = sum(self%gathered(parts))
   end function total
-
-  !> Sum over the rows of all ranks, row by row in the order of the whole body: each rank goes on
-  !> with the sum of the one before it.
-  real(wp) function running_total(self, terms) result(so_far)
-    class(ranks_t), intent(in) :: self
-    real(wp),       intent(in) :: terms(:)   !! one number per row of this rank
-    integer :: i
-
-    so_far = 0.0_wp
-    if (self%mine > 0) call mpi_recv(so_far, 1, mpi_double_precision, self%mine - 1, any_tag, &
-      mpi_comm_world, mpi_status_ignore)
-    do i = 1, size(terms)
-      so_far = so_far + terms(i)
-    end do
-    if (self%mine < self%count - 1) call mpi_send(so_far, 1, mpi_double_precision, &
-      self%mine + 1, any_tag, mpi_comm_world)
-    if (self%count > 1) &
-      call mpi_bcast(so_far, 1, mpi_double_precision, self%count - 1, mpi_comm_world)
-  end function running_total
 
   !> Largest number of the blocks of all ranks; -huge if there are no blocks.
   real(wp) function largest(self, parts)

@@ -30,7 +30,6 @@ module pd_blocks
     procedure :: spread_rows
     procedure :: total
     procedure :: totals
-    procedure :: running_total
     procedure :: largest
     procedure :: smallest
     procedure :: lowest_number
@@ -144,14 +143,6 @@ contains
       totals(k) = sum(all_parts(k, :))
     end do
   end function totals
-
-  !> Sum over all rows of all blocks, row by row.
-  real(wp) function running_total(self, terms)
-    class(blocks_t), intent(in) :: self
-    real(wp),        intent(in) :: terms(:)   !! one number per row of this rank
-
-    running_total = self%ranks%running_total(terms)
-  end function running_total
 
   !> Largest number of any block.
   real(wp) function largest(self, parts)

@@ -17,7 +17,6 @@ module pd_ranks
     integer, allocatable :: before(:)   !! blocks before those of each rank, and all (0:count)
   contains
     procedure, nopass :: total
-    procedure, nopass :: running_total
     procedure, nopass :: largest
     procedure, nopass :: smallest
     procedure, nopass :: lowest_number
@@ -67,13 +66,6 @@ contains
 
     total = sum(parts)
   end function total
-
-  !> Sum over the rows of all ranks, row by row in the order of the whole body.
-  pure real(wp) function running_total(terms)
-    real(wp), intent(in) :: terms(:)   !! one number per row of this rank
-
-    running_total = sum(terms)
-  end function running_total
 
   !> Largest number of the blocks of all ranks; -huge if there are no blocks.
   pure real(wp) function largest(parts)

@@ -26,6 +26,7 @@ module pd_body_force
   contains
     procedure :: add_forces
     procedure :: work
+    procedure :: add_block_work
     procedure :: description
     procedure :: acceleration
     procedure :: divide
@@ -78,22 +79,37 @@ contains
     end do
   end subroutine add_forces
 
-  !> The work of a force at all points is added row by row, from rank to rank.
+  !> All of it is added up block by block.
   real(wp) function work(self, v, t, t_next)
     class(body_force_t), intent(in) :: self
     real(wp),            intent(in) :: v(:, :), t, t_next
-    real(wp) :: power
-    integer  :: c
 
-    power = 0.0_wp
-    associate (a => self%blocks%first, b => self%blocks%last)
-      do c = 1, 2
-        if (self%acts(c)) power = power + self%blocks%running_total(self%volume(a:b) &
-          * self%density(a:b, c) * v(a:b, c))
-      end do
+    associate (unused => self, unused_v => v, unused_t => [t, t_next])
     end associate
-    work = (t_next - t) * (0.5_wp * (self%factor%rate(t) + self%factor%rate(t_next))) * power
+    work = 0.0_wp
   end function work
+
+  subroutine add_block_work(self, blocks, v, t, t_next, work)
+    class(body_force_t), intent(in)    :: self
+    type(blocks_t),      intent(in)    :: blocks
+    real(wp),            intent(in)    :: v(:, :), t, t_next
+    real(wp),            intent(inout) :: work(:)
+    real(wp) :: factor
+    integer  :: block, c
+
+    factor = (t_next - t) * (0.5_wp * (self%factor%rate(t) + self%factor%rate(t_next)))
+    !$omp parallel do schedule(static) default(none) private(block, c) &
+    !$omp shared(self, blocks, v, factor, work)
+    do block = 1, blocks%count
+      associate (lo => blocks%lo(block), hi => blocks%hi(block))
+        do c = 1, 2
+          if (self%acts(c)) work(block) = work(block) + factor * ordered_sum( &
+            self%volume(lo:hi) * self%density(lo:hi, c) * v(lo:hi, c))
+        end do
+      end associate
+    end do
+    !$omp end parallel do
+  end subroutine add_block_work
 
   !> Force in all at full load [N/m].
   pure function total(self) result(force)

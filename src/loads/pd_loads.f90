@@ -24,6 +24,7 @@ module pd_loads
     procedure :: acceleration => no_acceleration
     procedure :: mark_read => mark_nothing
     procedure :: divide => nothing_to_divide
+    procedure :: add_block_work => no_block_work
   end type load_t
 
   abstract interface
@@ -37,7 +38,8 @@ module pd_loads
       real(wp),      intent(inout) :: f(:, :)      !! force density (n,2) [N/m^3]
     end subroutine add_forces
 
-    !> Work from t to t_next, by the trapezoidal rule over the displacement of the step.
+    !> Work from t to t_next, by the trapezoidal rule over the displacement of the step; without
+    !> what is added up block by block.
     real(wp) function work(self, v, t, t_next)
       import :: load_t, wp
       class(load_t), intent(in) :: self
@@ -65,6 +67,7 @@ module pd_loads
   contains
     procedure :: add_forces => add_all_forces
     procedure :: work => work_of_all
+    procedure :: add_block_work => block_work_of_all
     procedure :: acceleration => acceleration_of_all
     procedure :: append
     procedure :: count => number_of_loads
@@ -100,6 +103,19 @@ contains
     associate (unchanged => self, unused => blocks)
     end associate
   end subroutine nothing_to_divide
+
+  !> Add the work at points of all blocks, block by block: here there is none.
+  subroutine no_block_work(self, blocks, v, t, t_next, work)
+    class(load_t),  intent(in)    :: self
+    type(blocks_t), intent(in)    :: blocks
+    real(wp),       intent(in)    :: v(:, :)       !! v^{n+1/2} (n,2) [m/s]
+    real(wp),       intent(in)    :: t, t_next     !! [s]
+    real(wp),       intent(inout) :: work(:)       !! (blocks) [J/m]
+
+    associate (unused => self, unused_blocks => blocks, unused_v => v, unused_t => [t, t_next], &
+      unchanged => work)
+    end associate
+  end subroutine no_block_work
 
   !> Number of loads.
   pure integer function number_of_loads(self) result(number)
@@ -149,6 +165,20 @@ contains
       work = work + self%items(k)%load%work(v, t, t_next)
     end do
   end function work_of_all
+
+  !> Add the work of loads on all points from t to t_next, block by block: no rank waits for it.
+  subroutine block_work_of_all(self, blocks, v, t, t_next, work)
+    class(loads_t), intent(in)    :: self
+    type(blocks_t), intent(in)    :: blocks
+    real(wp),       intent(in)    :: v(:, :)       !! v^{n+1/2} (n,2) [m/s]
+    real(wp),       intent(in)    :: t, t_next     !! [s]
+    real(wp),       intent(inout) :: work(:)       !! (blocks) [J/m]
+    integer :: k
+
+    do k = 1, size(self%items)
+      call self%items(k)%load%add_block_work(blocks, v, t, t_next, work)
+    end do
+  end subroutine block_work_of_all
 
   !> Acceleration of all loads at time t [m/s^2].
   pure function acceleration_of_all(self, t) result(acceleration)

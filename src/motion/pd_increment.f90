@@ -203,6 +203,8 @@ contains
       end associate
     end do
     ledger%outer_work = ledger%outer_work + model%loads%work(state%velocity, t, t + clock%time_step)
+    call model%loads%add_block_work(model%blocks, state%velocity, t, t + clock%time_step, &
+      ledger%work_at_points)
     ledger%damping = ledger%damping + increments%last%work
     if (model%blocks%has_first()) ledger%damping(1) = ledger%damping(1) + beyond
     call increments%jump%see(clock%step, model%blocks%total(increments%last%work) + beyond)

@@ -19,7 +19,8 @@ module pd_ledger
     real(wp), allocatable :: plastic(:)                 !! dissipated by flow (blocks) [J/m]
     real(wp), allocatable :: control(:)                 !! dissipated by the relaxing control
     real(wp), allocatable :: damping(:)                 !! dissipated by damping (blocks) [J/m]
-    real(wp), allocatable :: frame_work(:)              !! done by the damping's frame (blocks)
+    real(wp), allocatable :: work_at_points(:)          !! from outside: by the frame of the damping
+                                                        !! and loads on all points (blocks)
   contains
     procedure :: plastic_dissipation
     procedure :: control_dissipation
@@ -37,7 +38,7 @@ contains
     type(blocks_t), intent(in) :: blocks
 
     allocate (ledger%plastic(blocks%count), ledger%control(blocks%count), &
-      ledger%damping(blocks%count), ledger%frame_work(blocks%count), source=0.0_wp)
+      ledger%damping(blocks%count), ledger%work_at_points(blocks%count), source=0.0_wp)
   end function new_ledger
 
   !> Dissipated by plastic flow so far [J/m].
@@ -69,7 +70,7 @@ contains
     class(ledger_t), intent(in) :: self
     type(blocks_t),  intent(in) :: blocks
 
-    external_work = self%outer_work + blocks%total(self%frame_work)
+    external_work = self%outer_work + blocks%total(self%work_at_points)
   end function external_work
 
   !> Fit the sums of all blocks to a division into blocks: each rank keeps those of its own. Those
@@ -81,7 +82,7 @@ contains
     call fit_sums(self%plastic, blocks)
     call fit_sums(self%control, blocks)
     call fit_sums(self%damping, blocks)
-    call fit_sums(self%frame_work, blocks)
+    call fit_sums(self%work_at_points, blocks)
   end subroutine fit
 
   pure subroutine fit_sums(sums, blocks)
@@ -111,7 +112,7 @@ contains
     allocate (ledger%plastic, source=blocks%ranks%gathered(self%plastic))
     allocate (ledger%control, source=blocks%ranks%gathered(self%control))
     allocate (ledger%damping, source=blocks%ranks%gathered(self%damping))
-    allocate (ledger%frame_work, source=blocks%ranks%gathered(self%frame_work))
+    allocate (ledger%work_at_points, source=blocks%ranks%gathered(self%work_at_points))
   end function gathered
 
   !> Remember the largest work so far.

@@ -62,6 +62,8 @@ contains
       ledger%control = ledger%control + blocks%relaxed
       ledger%outer_work = ledger%outer_work + (model%supports%work(state%velocity, t, t_next) &
         + model%loads%work(state%velocity, t, t_next))
+      call model%loads%add_block_work(model%blocks, state%velocity, t, t_next, &
+        ledger%work_at_points)
       work%open = .not. whole
       if (work%open) return
       call move_points(kicks_t(second=.true.), model, damping_frame(model, t_next), dt, state, &
@@ -77,7 +79,7 @@ contains
     type(ledger_t), intent(inout) :: ledger
 
     ledger%damping = ledger%damping + work(1, :)
-    ledger%frame_work = ledger%frame_work + work(2, :)
+    ledger%work_at_points = ledger%work_at_points + work(2, :)
   end subroutine enter_damping
 
 end module pd_step

@@ -15,8 +15,8 @@
 !> Source: doc/theory.md, sections 4 and 5.
 module pd_balanced_list
   use pd_bond_list, only: bond_list_t
-  use pd_kinds, only: block_sum, i8, n_block, wp
-  use pd_operator_rows, only: mean_displacement, times_k_inverse
+  use pd_kinds, only: i8, wp
+  use pd_operator_rows, only: times_k_inverse
   implicit none
   private
 
@@ -30,7 +30,6 @@ module pd_balanced_list
     procedure :: finish_taking_in
     procedure :: divergence_sums_block
     procedure :: control_sums_block
-    procedure :: control_energy
     procedure :: memory
   end type balanced_list_t
 
@@ -199,40 +198,6 @@ contains
       f(i, 2) = f(i, 2) + fy
     end do
   end subroutine residual_sums_block
-
-  !> Energy of the control, half of minus its force times u; see `pd_operators`.
-  subroutine control_energy(self, volume, u, h, energy)
-    class(balanced_list_t), intent(in) :: self
-    real(wp), intent(in), contiguous :: volume(:)   !! V (n) [m^2]
-    real(wp), intent(in), contiguous :: u(:, :)     !! (n,2) [m]; as taken in
-    real(wp), intent(in), contiguous :: h(:, :)     !! H (n,4) xx xy yx yy: not needed
-    real(wp), intent(out) :: energy                 !! [J/m]; round-off does not make it negative
-    real(wp), allocatable :: parts(:), z(:, :)
-    real(wp) :: mean(2), terms(n_block)
-    integer  :: block, lo, hi
-
-    energy = 0.0_wp
-    if (.not. allocated(self%control) .or. size(h) == 0) return
-    allocate (z(self%n, 2), source=0.0_wp)
-    associate (blocks => self%domain%blocks)
-      allocate (parts(blocks%count))
-      mean = mean_displacement(blocks, volume, u)
-      !$omp parallel do schedule(static) default(none) private(block, lo, hi, terms) &
-      !$omp shared(self, volume, u, mean, z, parts)
-      do block = 1, self%domain%blocks%count
-        lo = self%domain%blocks%lo(block)
-        hi = self%domain%blocks%hi(block)
-        call self%control_sums_block(lo, hi, u, z)
-        terms = 0.0_wp
-        terms(:hi - lo + 1) = -0.5_wp * volume(lo:hi) * ((u(lo:hi, 1) - mean(1)) * z(lo:hi, 1) &
-          + (u(lo:hi, 2) - mean(2)) * z(lo:hi, 2))
-        parts(block) = block_sum(terms)
-      end do
-      !$omp end parallel do
-      energy = blocks%total(parts)
-    end associate
-    if (energy < 0.0_wp) energy = 0.0_wp   ! not max: it would hide what is not a number
-  end subroutine control_energy
 
   !> Memory that the operators take [bytes].
   pure real(wp) function memory(self)

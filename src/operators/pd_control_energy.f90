@@ -19,7 +19,8 @@ contains
   !>
   !>   -(1/2) sum_i V_i (u_i - u_mean) . Z[u]_i - (1/2) sum_i V_i c_i H_i : H_i K_i
   !>
-  !> The mean adds nothing, because the forces are in balance; with u alone digits would be lost.
+  !> Where Z holds the affine part too there is no second sum. The mean adds nothing, because the
+  !> forces are in balance; with u alone digits would be lost.
   subroutine control_energy(operators, volume, u, h, energy)
     class(operators_t), intent(in) :: operators
     real(wp), intent(in), contiguous :: volume(:)   !! V (n) [m^2]
@@ -55,12 +56,13 @@ contains
     integer,            intent(in) :: block
     real(wp), intent(in), contiguous :: volume(:), u(:, :), h(:, :), z(:, :)
     real(wp), intent(in) :: mean(2)   !! of u [m]
-    real(wp) :: terms(n_block), determinant_of_k, kxx, kyy, kxy
+    real(wp) :: terms(n_block), determinant_of_k, kxx, kyy, kxy, affine
     integer  :: i, lo, hi
 
     lo = operators%domain%blocks%lo(block)
     hi = operators%domain%blocks%hi(block)
     if (hi - lo + 1 < n_block) terms = 0.0_wp   ! sums go over whole blocks
+    affine = merge(0.0_wp, 1.0_wp, operators%sums_whole_control)
     associate (c => operators%control, inverse => operators%k_inverse)
       !$omp simd simdlen(8) private(determinant_of_k, kxx, kyy, kxy)
       do i = lo, hi
@@ -71,7 +73,7 @@ contains
         kyy = inverse(i, 1) * determinant_of_k
         kxy = -inverse(i, 3) * determinant_of_k
         terms(i - lo + 1) = -0.5_wp * volume(i) * ((u(i, 1) - mean(1)) * z(i, 1) &
-          + (u(i, 2) - mean(2)) * z(i, 2) + c(i) * (kxx * (h(i, 1)**2 + h(i, 3)**2) &
+          + (u(i, 2) - mean(2)) * z(i, 2) + affine * c(i) * (kxx * (h(i, 1)**2 + h(i, 3)**2) &
           + kyy * (h(i, 2)**2 + h(i, 4)**2) + 2.0_wp * kxy * (h(i, 1) * h(i, 2) &
           + h(i, 3) * h(i, 4))))
       end do

@@ -86,7 +86,7 @@ contains
     allocate (checkpoint%ledger_blocks(size(whole%plastic), 4))
     checkpoint%ledger_blocks(:, 1) = whole%plastic
     checkpoint%ledger_blocks(:, 2) = whole%damping
-    checkpoint%ledger_blocks(:, 3) = whole%frame_work
+    checkpoint%ledger_blocks(:, 3) = whole%work_at_points
     checkpoint%ledger_blocks(:, 4) = whole%control
     checkpoint%input = record%values
     allocate (checkpoint%changes(n_change, max(1, size(model%supports%items))), source=-1.0_wp)
@@ -129,7 +129,7 @@ contains
     ledger%outer_work = checkpoint%ledger(4)
     ledger%plastic = checkpoint%ledger_blocks(:, 1)
     ledger%damping = checkpoint%ledger_blocks(:, 2)
-    ledger%frame_work = checkpoint%ledger_blocks(:, 3)
+    ledger%work_at_points = checkpoint%ledger_blocks(:, 3)
     ledger%control = checkpoint%ledger_blocks(:, 4)
     call compare_used(checkpoint%input, used_values(input), input_errors)
   end subroutine load_checkpoint
