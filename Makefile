@@ -196,7 +196,7 @@ soak:              ## random kills, damaged checkpoints, full disks; MINUTES=20 
 	@$(venv)/bin/python tests/proof/soak/soak.py --minutes $(or $(MINUTES),20) \
 	  $(if $(KILLS),--kills $(KILLS)) --seed $(or $(SEED),1)
 
-sanitize:          ## races, two of them planted, and memory by valgrind; PARTS='races valgrind'
+sanitize:          ## races, addresses, undefined behaviour, valgrind; PARTS='races address'
 	@sh tools/setup.sh test
 	@$(submake) BUILD=debug $(parallel) program
 	@MAKE_COMMAND='$(MAKE)' $(venv)/bin/python tests/proof/sanitize/sanitize.py $(PARTS)

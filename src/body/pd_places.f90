@@ -191,7 +191,9 @@ contains
     real(wp),        intent(inout) :: volume(:)   !! of the points [spacing^2]
     real(wp) :: sliver
     integer  :: i, j, k
+    integer  :: ends(2, lbound(places%owner, 2):ubound(places%owner, 2))
 
+    ends = rows_of_points(places)
     do j = places%squares(1, 2), places%squares(2, 2) + 1
       do i = places%squares(1, 1), places%squares(2, 1) + 1
         if (places%owner(i, j) /= empty) cycle
@@ -202,29 +204,42 @@ contains
             2 * j - 1) + area_of_half(places, 2 * i - 1, 2 * j) + area_of_half(places, 2 * i, 2 * j)
         end if
         if (sliver <= 0.0_wp) cycle
-        k = nearest_point(places, i, j)
+        k = nearest_point(places, ends, i, j)
         if (k > 0) volume(k) = volume(k) + sliver
       end do
     end do
   end subroutine give_slivers
 
-  !> The point of the body nearest to a place.
-  pure integer function nearest_point(places, i, j) result(k)
+  !> Between which places of each row the points of the body lie; an empty range where none does.
+  pure function rows_of_points(places) result(ends)
     type(places_t), intent(in) :: places
+    integer :: ends(2, lbound(places%owner, 2):ubound(places%owner, 2))
+    integer :: i, j
+
+    do j = lbound(places%owner, 2), ubound(places%owner, 2)
+      ends(:, j) = [ubound(places%owner, 1) + 1, lbound(places%owner, 1) - 1]
+      do i = lbound(places%owner, 1), ubound(places%owner, 1)
+        if (places%owner(i, j) == 0) ends(:, j) = [min(ends(1, j), i), i]
+      end do
+    end do
+  end function rows_of_points
+
+  !> The point of the body nearest to a place, looked for in squares around it, each twice as wide as
+  !> the one before. What rows have is known, for in a needle all points may be far from most places.
+  pure integer function nearest_point(places, ends, i, j) result(k)
+    type(places_t), intent(in) :: places
+    integer,        intent(in) :: ends(:, lbound(places%owner, 2):)   !! see rows_of_points
     integer,        intent(in) :: i, j
-    integer     :: a, aside, b, reach
+    integer     :: a, b, reach
     integer(i8) :: least, square
 
     least = huge(1_i8)
     k = 0
-    reach = 0
-    do while (int(reach, i8)**2 < least .and. reach <= sum(shape(places%owner)))
-      reach = reach + 1
+    reach = 1
+    do while (int(reach, i8)**2 < least .and. reach <= 2 * sum(shape(places%owner)))
+      reach = 2 * reach
       do b = max(lbound(places%owner, 2), j - reach), min(ubound(places%owner, 2), j + reach)
-        ! the ring of this reach: whole rows above and below, two places of those between
-        aside = merge(1, 2 * reach, abs(b - j) == reach)
-        do a = i - reach, i + reach, aside
-          if (a < lbound(places%owner, 1) .or. a > ubound(places%owner, 1)) cycle
+        do a = max(ends(1, b), i - reach), min(ends(2, b), i + reach)
           if (places%owner(a, b) /= 0) cycle
           square = int(a - i, i8)**2 + int(b - j, i8)**2
           if (square > least) cycle

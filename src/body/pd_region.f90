@@ -317,18 +317,21 @@ contains
   pure function heights_of(edges, low, high) result(heights)
     real(wp), intent(in) :: edges(:, :), low(2), high(2)
     real(wp), allocatable :: heights(:)
-    real(wp) :: slopes(size(edges, 2)), y
+    real(wp) :: sides(2), slopes(size(edges, 2)), y
     integer  :: i, j
 
+    sides = [low(1), high(1)]
     heights = [low(2), high(2)]
     do i = 1, size(edges, 2)
-      call add(edges(2, i))
-      call add(edges(4, i))
+      call add_between(low(2), high(2), edges(2, i), heights)
+      call add_between(low(2), high(2), edges(4, i), heights)
       if (.not. edges(4, i) > edges(2, i)) cycle
       slopes(i) = (edges(3, i) - edges(1, i)) / (edges(4, i) - edges(2, i))
       if (abs(slopes(i)) > 0.0_wp) then
-        call add(edges(2, i) + (low(1) - edges(1, i)) / slopes(i))
-        call add(edges(2, i) + (high(1) - edges(1, i)) / slopes(i))
+        do j = 1, 2
+          y = edges(2, i) + (sides(j) - edges(1, i)) / slopes(i)
+          call add_between(low(2), high(2), y, heights)
+        end do
       end if
       do j = 1, i - 1
         if (.not. edges(4, j) > edges(2, j)) cycle
@@ -336,20 +339,20 @@ contains
         if (.not. abs(slopes(i) - slopes(j)) > 0.0_wp) cycle
         y = edges(2, i) + (edges(1, j) - edges(1, i) + slopes(j) * (edges(2, i) - edges(2, j))) &
           / (slopes(i) - slopes(j))
-        if (y > max(edges(2, i), edges(2, j)) .and. y < min(edges(4, i), edges(4, j))) call add(y)
+        if (y > max(edges(2, i), edges(2, j)) .and. y < min(edges(4, i), edges(4, j))) &
+          call add_between(low(2), high(2), y, heights)
       end do
     end do
     call sort(heights)
-
-  contains
-
-    pure subroutine add(height)
-      real(wp), intent(in) :: height
-
-      if (height > low(2) .and. height < high(2)) heights = [heights, height]
-    end subroutine add
-
   end function heights_of
+
+  !> Add a height to a list where it is between two others.
+  pure subroutine add_between(low, high, height, heights)
+    real(wp), intent(in) :: low, high, height
+    real(wp), allocatable, intent(inout) :: heights(:)
+
+    if (height > low .and. height < high) heights = [heights, height]
+  end subroutine add_between
 
   !> Area of the region between two heights that no edge begins, ends or crosses another between.
   pure real(wp) function area_of_slab(shapes, edges, left, right, heights) result(area)

@@ -60,10 +60,10 @@ contains
   !> The first stage.
   pure type(stage_t) function first_stage(input) result(first)
     type(input_t), intent(in) :: input
+    type(stage_t), allocatable :: stages(:)   ! what ASSOCIATE names gfortran does not free
 
-    associate (stages => stages_of(input))
-      first = stages(1)
-    end associate
+    stages = stages_of(input)
+    first = stages(1)
   end function first_stage
 
   !> A stage with everything in it, from the beginning.

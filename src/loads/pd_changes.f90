@@ -31,7 +31,7 @@ contains
   !> Support number k prescribes motion from now on; in its components nothing is free any more.
   !>
   !> The force of the platen stays: it is what the body gives at this moment.
-  pure subroutine change_to_motion(supports, k, place, t, free)
+  subroutine change_to_motion(supports, k, place, t, free)
     type(supports_t), intent(inout) :: supports
     integer,          intent(in)    :: k
     real(wp),         intent(in)    :: place(2)     !! displacement of the platen [m]

@@ -119,7 +119,7 @@ contains
   end subroutine lame_constants
 
   !> The law itself: it has no strength.
-  pure function reduced(self, factor) result(law)
+  function reduced(self, factor) result(law)
     class(elastic_t), intent(in)  :: self
     real(wp),         intent(in)  :: factor
     class(law_t), allocatable :: law

@@ -48,7 +48,7 @@ contains
   end function new_j2
 
   !> The same law with its residual strength divided by a factor.
-  pure function reduced(self, factor) result(law)
+  function reduced(self, factor) result(law)
     class(j2_t), intent(in) :: self
     real(wp),    intent(in) :: factor
     class(law_t), allocatable :: law

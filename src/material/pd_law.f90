@@ -74,7 +74,7 @@ module pd_law
     end subroutine moduli_of
     !> The same law with its strengths divided by a factor. The strength of the points is not part
     !> of it.
-    pure function reduced_of(self, factor) result(law)
+    function reduced_of(self, factor) result(law)
       import :: law_t, wp
       class(law_t), intent(in)  :: self
       real(wp),     intent(in)  :: factor

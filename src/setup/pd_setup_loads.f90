@@ -92,8 +92,9 @@ contains
     associate (b => given(k), body => model%body)
       set = boundary_set(b%name, body%boundary, k)
       set%points = model%operators%storage%row(set%points)
-      motion = [new_table(b%times, b%velocities_x, b%velocity(1)), &
-        new_table(b%times, b%velocities_y, b%velocity(2)), new_table(b%times, b%factors, 1.0_wp)]
+      motion(1) = new_table(b%times, b%velocities_x, b%velocity(1))
+      motion(2) = new_table(b%times, b%velocities_y, b%velocity(2))
+      motion(3) = new_table(b%times, b%factors, 1.0_wp)
       motion%since = since
       if (b%contact == 'affine') then
         allocate (support, source=new_affine_support(set, b%velocity_gradient, motion(3), &

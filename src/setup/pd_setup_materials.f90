@@ -23,7 +23,7 @@ module pd_setup_materials
   use pd_relaxing, only: new_relaxing, relaxing_t, whole_family, whole_family_t
   use pd_setup_gradients, only: set_up_stiffness, yield_stress_at
   use pd_small_strain, only: small_strain_t
-  use pd_stages, only: stage_t, stages_of
+  use pd_stages, only: first_stage, stage_t
   implicit none
   private
 
@@ -65,6 +65,7 @@ contains
     type(input_t), intent(in)    :: input
     type(stage_t), intent(in)    :: stage
     type(model_t), intent(inout) :: model
+    type(stage_t) :: first
     integer,  allocatable :: law_of(:), material_of(:)
     real(wp), allocatable :: strength(:)
     integer :: k
@@ -92,11 +93,10 @@ contains
       model%strength = model%operators%storage%spread(strength)
     end associate
     if (model%whole%n > 0) then
-      associate (stages => stages_of(input))
-        allocate (model%shown_strength(model%whole%n))
-        call set_up_strength(input, stages(1)%material_of(model%whole%part), &
-          model%whole%position, top_of(model), model%shown_strength)
-      end associate
+      allocate (model%shown_strength(model%whole%n))
+      first = first_stage(input)
+      call set_up_strength(input, first%material_of(model%whole%part), model%whole%position, &
+        top_of(model), model%shown_strength)
     end if
     if (input%stabilisation%method == 'silling') &
       call set_up_control(input%stabilisation%factor, law_of, model)
@@ -141,7 +141,7 @@ contains
   end subroutine set_up_bearings
 
   !> The law of a material.
-  pure function new_law(given) result(law)
+  function new_law(given) result(law)
     type(material_input_t), intent(in) :: given
     class(law_t), allocatable :: law
 
@@ -154,7 +154,7 @@ contains
   end function new_law
 
   !> The strain measure of a material.
-  pure function new_measure(name) result(measure)
+  function new_measure(name) result(measure)
     character(*), intent(in) :: name
     class(measure_t), allocatable :: measure
 

@@ -109,7 +109,7 @@ contains
     shear_modulus = self%shear_modulus
   end subroutine lame_constants
 
-  pure function reduced(self, factor) result(law)
+  function reduced(self, factor) result(law)
     class(damage_t), intent(in) :: self
     real(wp),        intent(in) :: factor
     class(law_t), allocatable :: law

@@ -1,8 +1,11 @@
 """Races and memory: the program under checkers.
 
-    .venv/bin/python tests/proof/sanitize/sanitize.py [races] [valgrind]
+    .venv/bin/python tests/proof/sanitize/sanitize.py [races] [address] [quick] [valgrind]
 
 races     ThreadSanitizer with an OpenMP that it understands; races planted on purpose are found
+address   AddressSanitizer and the sanitizer of undefined behaviour over the unit suites, tiny runs
+          and cases that run the program; faults planted on purpose are found
+quick     the same over the tiny runs and a few suites: an eighth of the time. Only on demand
 valgrind  a tiny run of the checking build
 
 `make sanitize` calls this.
@@ -16,8 +19,11 @@ import sys
 import tempfile
 from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[3]
-HERE = Path(__file__).resolve().parent
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+
+import addresses
+from common import HERE, ROOT, Count, make, run
+
 TWO_BLOCKS = 0.05  # spacing of bodies with several blocks of 256 rows
 BODY = """\
 &run name = 'case', output_dir = 'out', operators = '{operators}' /
@@ -72,44 +78,6 @@ PLANTS = {
         "        state%displacement, state%force)\n",
     ),
 }
-
-
-class Count:
-    passed = failed = 0
-
-    def note(self, what, good, said=""):
-        self.passed += good
-        self.failed += not good
-        print(f"  {'ok    ' if good else 'FAILED'}  {what}", flush=True)
-        if not good:
-            print("\n".join(f"          {line}" for line in said.splitlines()[-40:]), flush=True)
-
-
-def make(folder, flags, *goals, more=()):
-    """Build with some flags in a folder of its own; return whether it worked."""
-    words = [
-        *os.environ.get("MAKE_COMMAND", "make").split(), "--no-print-directory", "BUILD=opt",
-        "MARCH=", "ALIGNED=0", f"FFLAGS={flags}", f"unit_flags={flags}", f"build=build/{folder}",
-        f"program=build/{folder}/perigeo", *more, *goals,
-    ]  # fmt: skip
-    if "-j" not in os.environ.get("MAKEFLAGS", ""):
-        words.append(f"-j{os.cpu_count() or 1}")
-    done = subprocess.run(words, cwd=ROOT, check=False, capture_output=True, text=True,
-                          env={**os.environ, "MAKEFLAGS": ""})  # fmt: skip
-    if done.returncode != 0:
-        print(done.stdout[-2000:], done.stderr[-4000:])
-    return done.returncode == 0
-
-
-def run(words, text, environment, limit=600):
-    """Run a program on an input in a folder of its own; return exit status and what it said."""
-    with tempfile.TemporaryDirectory(prefix="perigeo-sanitize-") as folder:
-        (Path(folder) / "run.nml").write_text(text)
-        done = subprocess.run(
-            [*map(str, words), "run.nml"], cwd=folder, check=False, capture_output=True, text=True,
-            errors="replace", timeout=limit, env={**os.environ, **environment},
-        )  # fmt: skip
-    return done.returncode, done.stdout + done.stderr
 
 
 # ------------------------------------------------------------------------------------ parts
@@ -196,7 +164,13 @@ def valgrind(count):
         count.note(f"valgrind: {name}", status == 0 and "== " not in said, said)
 
 
-PARTS = {"races": races, "valgrind": valgrind}
+PARTS = {
+    "races": races,
+    "address": lambda count: addresses.check(count, TINY),
+    "quick": lambda count: addresses.check(count, TINY, quick=True),
+    "valgrind": valgrind,
+}
+ALL = ("races", "address", "valgrind")
 
 
 def main():
@@ -204,7 +178,7 @@ def main():
     parser.add_argument("parts", nargs="*", choices=[*PARTS, []], default=[])
     options = parser.parse_args()
     count = Count()
-    for part in options.parts or PARTS:
+    for part in options.parts or ALL:
         PARTS[part](count)
     print(f"{count.passed} passed, {count.failed} failed")
     return 1 if count.failed or not count.passed else 0
