@@ -46,7 +46,7 @@ contains
       due%progress = progress_due(run%record%progress, step, run%schedule%steps)
     call system_clock(now, rate)
     due%checkpoint = run%input%output%checkpoint_due(real(now - run%last_checkpoint, wp) &
-      / real(rate, wp), last=step == run%schedule%steps)
+      / real(rate, wp), last=step == run%schedule%steps, cost=run%checkpoint_seconds)
     found = [pending_signal(), merge(1, 0, due%checkpoint), merge(1, 0, due%progress), &
       merge(1, 0, run%trouble%count() > 0)]
     call run%ranks%largest_numbers(found)
@@ -104,6 +104,7 @@ contains
     type(due_t),        intent(in)    :: due
     type(run_t),        intent(inout) :: run
     type(error_list_t), intent(inout) :: errors
+    integer(int64) :: begun, rate
     integer :: k
 
     if (due%frame) call look_at_frame(run, errors)
@@ -111,9 +112,11 @@ contains
       call record_frame(run%model, run%state, run%record, errors)
     end do
     if (.not. due%checkpoint) return
+    call system_clock(begun, rate)
     call save_checkpoint(run%model, run%state, run%ledger, run%clock, run%limit, &
       run%record, errors)
     call system_clock(run%last_checkpoint)
+    run%checkpoint_seconds = real(run%last_checkpoint - begun, wp) / real(rate, wp)
   end subroutine write_frames_and_checkpoint
 
 end module pd_run_steps
