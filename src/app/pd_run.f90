@@ -75,6 +75,7 @@ module pd_run
     logical :: jump_told = .false.            !! at equilibrium
     real(wp) :: largest_reaction = 0.0_wp     !! of a platen so far [N/m]
     integer(int64) :: last_checkpoint = 0     !! count of the system clock
+    real(wp) :: checkpoint_seconds = 0.0_wp   !! that it took
     integer(int64) :: loop_start = 0          !! count of the system clock
   end type run_t
 

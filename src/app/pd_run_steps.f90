@@ -47,12 +47,14 @@ contains
       found = found_before(step, run)
       call run%ranks%largest_numbers(found)
     end if
-    run%work%news = found_before(step + 1, run)
-    run%heard = .true.
     due%signal = found(1)
     due%stop = due%signal /= 0 .or. found(4) > 0
     due%checkpoint = due%stop .or. found(2) > 0
     due%progress = found(3) > 0
+    run%heard = .true.
+    run%work%news = found_before(step + 1, run)
+    if (due%checkpoint) run%work%news(2) = 0   ! not written yet, and not due again
+    if (due%progress) run%work%news(3) = 0
     due%anything = due%row .or. due%frame .or. due%checkpoint
     due%whole = due%anything .or. run%limit%look_due(step) .or. run%model%at_equilibrium
   end function due_after_step
@@ -67,8 +69,8 @@ contains
 
     call system_clock(now, rate)
     found = [pending_signal(), merge(1, 0, run%input%output%checkpoint_due( &
-      real(now - run%last_checkpoint, wp) / real(rate, wp), last=step == run%schedule%steps)), &
-      0, merge(1, 0, run%trouble%count() > 0)]
+      real(now - run%last_checkpoint, wp) / real(rate, wp), last=step == run%schedule%steps, &
+      cost=run%checkpoint_seconds)), 0, merge(1, 0, run%trouble%count() > 0)]
     if (.not. run%record%elsewhere) &
       found(3) = merge(1, 0, progress_due(run%record%progress, step, run%schedule%steps))
   end function found_before
@@ -119,6 +121,7 @@ contains
     type(due_t),        intent(in)    :: due
     type(run_t),        intent(inout) :: run
     type(error_list_t), intent(inout) :: errors
+    integer(int64) :: begun, rate
     integer :: k
 
     if (due%frame) call look_at_frame(run, errors)
@@ -126,9 +129,11 @@ contains
       call record_frame(run%model, run%state, run%record, errors)
     end do
     if (.not. due%checkpoint) return
+    call system_clock(begun, rate)
     call save_checkpoint(run%model, run%state, run%ledger, run%clock, run%limit, &
       run%record, errors)
     call system_clock(run%last_checkpoint)
+    run%checkpoint_seconds = real(run%last_checkpoint - begun, wp) / real(rate, wp)
   end subroutine write_frames_and_checkpoint
 
 end module pd_run_steps

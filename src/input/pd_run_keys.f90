@@ -80,7 +80,7 @@ contains
       range=range_t(1.0_wp, real(max_rows, wp)), &
       meaning='rows of the history over the run, the unloaded state aside'), self%history_count)
     call visitor%real_key(key_t('checkpoint_every', unit='s', range=not_negative, &
-      stands_for='900, and none of the last step', &
+      stands_for='900, or more if a checkpoint takes longer than 9 s; none of the last step', &
       meaning='wall-clock time between checkpoints, the last one of the last step; 0: only when ' &
       //'stopped by a signal'), &
       self%checkpoint_every)
@@ -95,17 +95,19 @@ contains
   end subroutine complete_output
 
   !> Whether a checkpoint is due for the clock's sake. Who asks for some gets one of the last step
-  !> as well; of a run that says nothing one is kept too, so seldom that it costs nothing.
-  pure logical function checkpoint_due(self, seconds, last) result(due)
+  !> as well; of a run that says nothing one is kept too, so seldom that it costs less than 1 %.
+  pure logical function checkpoint_due(self, seconds, last, cost) result(due)
     class(output_input_t), intent(in) :: self
     real(wp), intent(in) :: seconds   !! since the last checkpoint, or since the run began
     logical,  intent(in) :: last      !! at the last step
-    real(wp), parameter  :: by_default = 900.0_wp
+    real(wp), intent(in), optional :: cost   !! of the last checkpoint [s]
+    real(wp), parameter  :: by_default = 900.0_wp, part = 0.01_wp
 
     if (is_set(self%checkpoint_every)) then
       due = self%checkpoint_every > 0.0_wp .and. (last .or. seconds >= self%checkpoint_every)
     else
       due = seconds >= by_default
+      if (present(cost)) due = due .and. cost <= part * seconds
     end if
   end function checkpoint_due
 
