@@ -62,7 +62,7 @@ contains
     type(input_t), intent(in) :: input
     type(stage_t), allocatable :: stages(:)   ! what ASSOCIATE names gfortran does not free
 
-    stages = stages_of(input)
+    allocate (stages, source=stages_of(input))
     first = stages(1)
   end function first_stage
 

@@ -50,7 +50,7 @@ LIMITS = [line for line in (DOC / "limits.md").read_text().splitlines() if line[
 @pytest.mark.parametrize("line", LIMITS, ids=lambda line: re.sub(r"\W+", "_", line[2:30]))
 def test_the_numbers_of_a_limit_are_published(line):
     said = line.split(" | ")[2]
-    pages = ["choices.md", "model.md", "verification.md", "study_tables.md"]
+    pages = ["choices.md", "model.md", "verification.md", "study_tables.md", "tutorials/figure.md"]
     text = "\n".join((DOC / name).read_text() for name in pages)
     numbers = re.findall(r"(?<![\w.-])\d+\.?\d*(?:e-\d+)?", re.sub(r"\]\([^)]*\)", "", said))
     missing = [n for n in numbers if not re.search(rf"(?<![\d.]){re.escape(n)}(?![\d])", text)]
@@ -62,7 +62,7 @@ def test_the_warnings_of_the_limits_are_those_of_the_program():
     named = {n for line in LIMITS for n in re.findall(r"`(\w+)`", line.split(" | ")[3])}
     assert len(named) > 6
     assert not [name for name in named if f"doubt_kind_t('{name}'" not in kinds]
-    assert len(LIMITS) == 14
+    assert len(LIMITS) == 15
 
 
 def glossary():

@@ -34,6 +34,33 @@ def test_no_link_anchor_or_picture_is_missing_and_nothing_is_loaded_from_elsewhe
     assert not faults(site.output)
 
 
+def test_every_page_fits_on_a_phone(site, tmp_path, monkeypatch):
+    """In a browser without a window; `make site-view` looks at more."""
+    pytest.importorskip("selenium", reason="make site-view installs selenium")
+    monkeypatch.setenv("SE_OFFLINE", "true")
+    import view_report
+    import view_site
+    from selenium.common.exceptions import NoSuchDriverException
+
+    found = view_report.find_browser()
+    if found is None:
+        pytest.skip("no browser")
+    kind, *programs = found
+    try:
+        browser = kind(*programs, False)
+    except NoSuchDriverException:
+        pytest.skip("no driver for the browser")
+    try:
+        viewer = view_site.Viewer(browser, site.output, tmp_path, "light")
+        viewer.size(380, 800)
+        pages = [page for page in view_site.documents(site.output) if "/pd_" not in page]
+        seen = {page: view_site.faults(viewer.look(page), viewer.address) for page in pages}
+    finally:
+        browser.browser.quit()
+    assert len(seen) > 35
+    assert not {page: words for page, words in seen.items() if words}
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [

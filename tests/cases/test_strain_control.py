@@ -107,14 +107,29 @@ def test_a_sudden_velocity_is_work_of_the_platen(run_case, tmp_path):
     assert np.abs(rows["energy_error"][rows["time"] > 0.4]).max() < 5e-4
 
 
-def test_the_example_meets_the_closed_form(run_case, tmp_path):
-    done = run_case(ROOT / "input/biaxial_isotropic.nml", tmp_path, "--output", "out")
+def test_the_example_meets_the_closed_form_as_its_head_says(run_case, tmp_path):
+    example = ROOT / "input/biaxial_isotropic.nml"
+    done = run_case(example, tmp_path, "--output", "out")
     assert done.returncode == 0, done.stderr
     assert "warning" not in done.stdout
     assert "top: motion in place of the traction from 0.5 s on" in done.stdout
     rows = history(tmp_path / "out" / "biaxial_isotropic_history.csv")
     assert_laboratory(rows)
     assert "motion from 0.5 s on" in done.stdout
+    head = " ".join(example.read_text().partition("&run")[0].replace("!", " ").split())
+    with h5py.File(tmp_path / "out" / "biaxial_isotropic.h5", locking=False) as file:
+        body = file["points/boundary"][()] == 0
+        stress = file["frames/000001/stress"][()][body, 1]
+        height = file["points/position"][()][body, 1]
+    found = -1e-3 * stress
+    assert f"{found.min():.0f} to {found.max():.0f} within" in head
+    middle = found[abs(height - 0.05) < 0.02]
+    assert f"{middle.min():.0f} to {middle.max():.0f} kPa in the middle" in head
+    at = int(np.searchsorted(rows["time"], CHANGE - 1e-6)) + 5
+    slope = -np.diff(rows["top_force_y"])[at] / 0.05 / np.diff(rows["strain"])[at]
+    assert f"a slope of {1e-6 * slope:.1f} MPa" in head
+    true = -rows["top_force_y"] / 0.05 / (1.0 + rows["strain"]) - CELL
+    assert true[rows["time"] > 0.8] == pytest.approx(2.0 * C_U, rel=0.025)
 
 
 @pytest.mark.parametrize("rows", [20, 140])

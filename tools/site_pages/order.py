@@ -44,6 +44,7 @@ GROUPS = {
     "Reference": [
         "doc/input.md",
         "doc/results.md",
+        "doc/measures.md",
         "doc/studies.md",
         "postproc/README.md",
         "doc/parallel.md",

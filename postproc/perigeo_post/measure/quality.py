@@ -1,6 +1,6 @@
 """How nearly a run was in equilibrium at all times, as a quasi-static test should be.
 
-Two numbers, both small in a good run (doc/results.md):
+Two numbers, both small in a good run (doc/measures.md):
 
 * *kinetic ratio*: kinetic energy of v - v_ref over internal energy, which is strain energy and
   plastic dissipation. v_ref is the frame of the damping: linear between the platens, or 0 at rest.

@@ -1,7 +1,7 @@
 """The measures that a study can ask for: groups of columns of its table of runs.
 
 Each group takes one run at one state. Nothing is raised for what a run cannot tell: in place of the
-value stands why there is none. doc/results.md defines the quantities.
+value stands why there is none. doc/measures.md defines the quantities.
 """
 
 from __future__ import annotations
