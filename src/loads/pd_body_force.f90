@@ -59,7 +59,7 @@ contains
   end function new_body_force
 
   !> f <- f + r b.
-  pure subroutine add_forces(self, volume, t, f)
+  subroutine add_forces(self, volume, t, f)
     class(body_force_t), intent(in)    :: self
     real(wp),            intent(in)    :: volume(:), t
     real(wp),            intent(inout) :: f(:, :)
@@ -71,11 +71,11 @@ contains
     factor = self%factor%rate(t)
     do c = 1, 2
       if (.not. self%acts(c)) cycle
-      associate (density => self%density)
-        do i = self%blocks%first, self%blocks%last
-          f(i, c) = f(i, c) + factor * density(i, c)
-        end do
-      end associate
+      !$omp parallel do simd schedule(static) default(none) private(i) shared(self, f, factor, c)
+      do i = self%blocks%first, self%blocks%last
+        f(i, c) = f(i, c) + factor * self%density(i, c)
+      end do
+      !$omp end parallel do simd
     end do
   end subroutine add_forces
 

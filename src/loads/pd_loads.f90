@@ -30,7 +30,7 @@ module pd_loads
   abstract interface
 
     !> Add the load of time t to the force density.
-    pure subroutine add_forces(self, volume, t, f)
+    subroutine add_forces(self, volume, t, f)
       import :: load_t, wp
       class(load_t), intent(in)    :: self
       real(wp),      intent(in)    :: volume(:)    !! V (n) [m^2]
@@ -141,7 +141,7 @@ contains
   end subroutine append
 
   !> Add the loads of time t to the force density, in their order.
-  pure subroutine add_all_forces(self, volume, t, f)
+  subroutine add_all_forces(self, volume, t, f)
     class(loads_t), intent(in)    :: self
     real(wp),       intent(in)    :: volume(:)     !! V (n) [m^2]
     real(wp),       intent(in)    :: t             !! [s]
