@@ -68,8 +68,8 @@ studies := fig3a fig3b fig4 fig5 seeds horizon loading size softening influence 
   zero_energy equilibrium
 # Targets that need no compiler, or see to it themselves.
 sets_up := all setup first-footing uninstall wheel demo demo-quick test debug lint verify layers \
-  help clean distclean figures $(studies) report report-view gallery site site-view bench clouds \
-  finite_elements limit_loads mutants fuzz soak sanitize test_ranks scaling
+  help clean distclean figures $(studies) report report-view gallery tutorials site site-view \
+  bench clouds finite_elements limit_loads mutants fuzz soak sanitize test_ranks scaling
 .PHONY: program objects post units install $(sets_up)
 .DEFAULT_GOAL := all
 
@@ -155,6 +155,11 @@ gallery:           ## draw every kind of figure, in results/gallery; PUBLISH=1: 
 first-footing:     ## type doc/first_footing.md in a fresh clone and time it; PUBLISH=1: its table
 	@sh tools/setup.sh run
 	@$(venv)/bin/python tools/first_footing.py $(if $(PUBLISH),--publish)
+
+tutorials:         ## type every tutorial from its page in full and check its numbers: minutes
+	@sh tools/setup.sh test
+	@$(submake) $(parallel) program
+	@TUTORIALS=full $(venv)/bin/python -m pytest -q tests/cases/test_tutorials.py
 
 site:              ## documents, tutorials, gallery and modules as pages: build/site/index.html
 	@sh tools/setup.sh site

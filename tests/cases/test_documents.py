@@ -4,6 +4,7 @@ import re
 from pathlib import Path
 
 import h5py
+import perigeo_post.version
 import pytest
 from case_files import SPECIMEN
 
@@ -112,10 +113,71 @@ def test_the_results_page_lists_every_attribute_of_the_file(result):
     assert not [name for name in attributes if f"`{name}`" not in page]
 
 
-def test_the_version_to_cite_is_the_version():
+def mistakes_of_releases(changelog):
+    """Return what is wrong with the list of releases: versions, dates, steps of the number."""
+    found = []
+    rows = re.findall(
+        r"^\| ([\d.]+|next) \| ([\d-]+|not yet) \| (change|stay|first version) \|$", changelog, re.M
+    )
+    sections = dict(re.findall(r"^## (\S+)\n\n(Results (?:change|stay)[^\n]*)", changelog, re.M))
+    named = ["next" if name == "Unreleased" else name for name in sections]
+    if [row[0] for row in rows] != named:
+        found.append(f"the list has {[row[0] for row in rows]}, the sections are {named}")
+    for name, words in zip(named, sections.values()):
+        said = next((row[2] for row in rows if row[0] == name), "nothing")
+        if said.split()[0] not in words:
+            found.append(f"{name}: the list says {said!r}, the section {words[:20]!r}")
+    released = [row for row in rows if row[0] != "next"]
+    dates = [row[1] for row in released]
+    if "" in dates or dates != sorted(dates, reverse=True):
+        found.append(f"dates: {dates}")
+    for (new, _, results), (old, _, _) in zip(released, released[1:]):
+        new_parts, old_parts = ([int(n) for n in v.split(".")] for v in (new, old))
+        changed = new_parts[:2] != old_parts[:2]
+        if new_parts <= old_parts or changed != (results == "change"):
+            found.append(f"{old} to {new}: results {results}")
+    return found
+
+
+RELEASES = """\
+| next | not yet | stay |
+| 0.2.0 | 2027-02-01 | change |
+| 0.1.0 | 2027-01-01 | first version |
+
+## Unreleased
+
+Results stay.
+
+## 0.2.0
+
+Results change: all of them.
+
+## 0.1.0
+
+Results change: first version.
+"""
+
+
+def test_the_releases_are_listed_and_numbered_by_their_results():
+    assert not mistakes_of_releases((ROOT / "CHANGELOG.md").read_text())
+    assert not mistakes_of_releases(RELEASES)
+    for right, wrong in (
+        ("| 0.2.0 |", "| 0.3.0 |"),
+        ("2027-02-01", "2026-02-01"),
+        ("| 2027-02-01 | change |", "| 2027-02-01 | stay |"),
+        ("0.2.0", "0.1.1"),
+    ):
+        assert mistakes_of_releases(RELEASES.replace(right, wrong)), wrong
+
+
+def test_the_version_is_the_same_everywhere():
     version = (ROOT / "VERSION").read_text().strip()
     assert f"\nversion: {version}\n" in (ROOT / "CITATION.cff").read_text()
     assert f"\n## {version}\n" in (ROOT / "CHANGELOG.md").read_text()
+    assert f'\nversion = "{version}"\n' in (ROOT / "postproc/pyproject.toml").read_text()
+    assert perigeo_post.version.__version__ == version
+    text = (ROOT / "packaging/README.md").read_text()
+    assert set(re.findall(r"\d+\.\d+\.\d+", text)) == {version}
 
 
 def test_every_picture_of_the_gallery_has_an_input_or_command():

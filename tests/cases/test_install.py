@@ -1,9 +1,11 @@
 """make, and make install: into an empty folder, used without the repository, taken away again."""
 
 import os
+import re
 import shutil
 import subprocess
 import sys
+import sysconfig
 from pathlib import Path
 
 import pytest
@@ -43,6 +45,58 @@ def test_make_without_a_compiler_names_the_set_up():
     done = make("FC=no-such-compiler")
     assert done.returncode == 2
     assert "no Fortran compiler (no-such-compiler): `make setup` installs or names" in done.stderr
+
+
+def test_the_set_up_names_what_needs_no_root_first(tmp_path):
+    for name, text in (("id", "echo 1000"), ("sudo", "exit 1")):
+        (tmp_path / name).write_text(f"#!/bin/sh\n{text}\n")
+        (tmp_path / name).chmod(0o755)
+    surroundings = {k: v for k, v in os.environ.items() if not k.startswith("CONDA")}
+    surroundings |= {"PATH": f"{tmp_path}:/usr/bin:/bin", "FC": "no-such-compiler"}
+    done = subprocess.run(
+        ["sh", "tools/setup.sh", "run"],
+        cwd=ROOT, env=surroundings, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 1
+    assert "Missing: compiler" in done.stdout
+    places = [done.stdout.find(words) for words in ("conda create", "module load", "or, as root:")]
+    assert -1 not in places
+    assert places == sorted(places)
+    assert "sudo" not in done.stdout[: places[-1]]
+
+
+def test_the_wheel_in_a_fresh_environment(tmp_path):
+    """Its needs are those of this environment, behind what is installed from the wheel."""
+    pytest.importorskip("setuptools", "70.1", reason="makes no wheel by itself before 70.1")
+    source, made = tmp_path / "source", tmp_path / "made"
+    shutil.copytree(ROOT / "postproc", source, ignore=shutil.ignore_patterns("*.egg-info"))
+    pip = [sys.executable, "-m", "pip", "--quiet", "--disable-pip-version-check"]
+    options = ["--no-deps", "--no-index", "--no-build-isolation", "--wheel-dir", str(made)]
+    subprocess.run([*pip, "wheel", *options, str(source)], check=True)
+    (wheel,) = made.glob("perigeo_post-*-py3-none-any.whl")
+    fresh = tmp_path / "fresh"
+    subprocess.run([sys.executable, "-m", "venv", "--without-pip", str(fresh)], check=True)
+    (packages,) = fresh.glob("lib/python*/site-packages")
+    into = ["--python", str(fresh / "bin/python"), "install", "--no-deps", "--no-index"]
+    subprocess.run([*pip, *into, str(wheel)], check=True)
+    (packages / "needs.pth").write_text(sysconfig.get_path("purelib") + "\n")
+    ask = "import perigeo_post.report as r; print(r.__file__, len(list(r.__path__)))"
+
+    def run(*words):
+        done = subprocess.run(
+            words, cwd=tmp_path, capture_output=True, text=True, check=True,
+            env={k: v for k, v in os.environ.items() if k != "PYTHONPATH"},
+        )  # fmt: skip
+        return done.stdout
+
+    assert str(fresh) in run(str(fresh / "bin/python"), "-c", ask)
+    command = str(fresh / "bin/perigeo-post")
+    assert "yield_stress" in run(command, "advise", "--cu", "5e4", "--size", "0.05", "0.1")
+    assert "usage: perigeo-post" in run(command, "report", "--help")
+    assert list(packages.glob("perigeo_post/report/templates/*.html*"))
+    about = next(packages.glob("perigeo_post-*.dist-info/METADATA")).read_text()
+    extras = set(re.findall(r"^Provides-Extra: (\w+)$", about, re.M))
+    assert extras >= {"study", "report", "xarray", "notebook"}
 
 
 def files(folder):

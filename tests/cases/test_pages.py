@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from perigeo_post import Run
+from perigeo_post import Run, stress_strain
 from perigeo_post.measure.limit_load import limit_loads
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -111,7 +111,8 @@ def footing_folder(program, tmp_path):
     return folder
 
 
-def test_the_first_footing_is_typed_from_its_page(footing_folder, program, capfd):
+def test_the_first_footing_is_typed_from_its_page(footing_folder, program, capfd, monkeypatch):
+    monkeypatch.setenv("OMP_NUM_THREADS", "1")  # threads take cores from tests beside this one
     page = first_footing.PAGE.read_text()
     given = first_footing.commands(page)
     assert given[:4] == [
@@ -124,7 +125,9 @@ def test_the_first_footing_is_typed_from_its_page(footing_folder, program, capfd
     timed = first_footing.type_it(given, files, "", footing_folder.parent)
     assert [one.command for one in timed] == given[1:]
     said = re.search(r"`(limit load   footing: [^`]*)`", page)[1]
-    shown = re.search(r"^.*limit load .*footing: .*$", capfd.readouterr().out, re.M)[0]
+    out = capfd.readouterr().out
+    assert re.search(r"^step .* footing y -0\.0\d+ m +-[\d.]+ kN/m", out, re.M)  # what it is about
+    shown = re.search(r"^.*limit load .*footing: .*$", out, re.M)[0]
     number = r"(?<= )\d+\.?\d*"
     assert re.sub(number, "#", shown).split() == re.sub(number, "#", said).split()
     of_page = [float(n) for n in re.findall(number, said)]
@@ -138,6 +141,21 @@ def test_the_first_footing_is_typed_from_its_page(footing_folder, program, capfd
         if path.exists():
             load = 1e-3 * limit_loads(Run(path))[0].load
             assert abs(load / exact - 1.0) == pytest.approx(error, abs=1e-4)
+
+
+def test_the_page_of_an_own_test_is_typed_too(footing_folder, program, capfd, monkeypatch):
+    if program.name != "perigeo":
+        pytest.skip("takes long with all checks")
+    monkeypatch.setenv("OMP_NUM_THREADS", "1")
+    given = first_footing.commands((DOC / "own_test.md").read_text())
+    assert len(given) > 3
+    typed = [
+        command for command in given if "isotropic_modulus" not in command and "B =" not in command
+    ]
+    first_footing.type_it(typed, {}, "", footing_folder)
+    assert "the input is right" in capfd.readouterr().out
+    curve = stress_strain(Run(footing_folder / "results" / "own_test" / "own_test.h5"))
+    assert curve.y.max() == pytest.approx(2.0 * 50e3, rel=0.02)
 
 
 def test_the_times_of_the_first_footing_are_those_of_its_commands():

@@ -34,7 +34,7 @@ def test_no_link_anchor_or_picture_is_missing_and_nothing_is_loaded_from_elsewhe
     assert not faults(site.output)
 
 
-def test_every_page_fits_on_a_phone(site, tmp_path, monkeypatch):
+def test_every_page_fits_on_a_phone_and_the_limits_on_a_screen(site, tmp_path, monkeypatch):
     """In a browser without a window; `make site-view` looks at more."""
     pytest.importorskip("selenium", reason="make site-view installs selenium")
     monkeypatch.setenv("SE_OFFLINE", "true")
@@ -55,10 +55,15 @@ def test_every_page_fits_on_a_phone(site, tmp_path, monkeypatch):
         viewer.size(380, 800)
         pages = [page for page in view_site.documents(site.output) if "/pd_" not in page]
         seen = {page: view_site.faults(viewer.look(page), viewer.address) for page in pages}
+        viewer.size(1280, 900)
+        viewer.look("doc/limits.html")
+        bottom = "return document.querySelector('table').getBoundingClientRect().bottom"
+        end = browser.browser.execute_script(bottom)
     finally:
         browser.browser.quit()
     assert len(seen) > 35
     assert not {page: words for page, words in seen.items() if words}
+    assert end < 900  # what matters most
 
 
 @pytest.mark.parametrize(
