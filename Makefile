@@ -69,7 +69,7 @@ studies := fig3a fig3b fig4 fig5 seeds horizon loading size softening influence 
 # Targets that need no compiler, or see to it themselves.
 sets_up := setup uninstall wheel demo demo-quick test debug lint verify layers help clean \
   distclean figures $(studies) report report-view gallery site site-view bench clouds \
-  finite_elements limit_loads mutants fuzz soak sanitize test_ranks scaling
+  finite_elements limit_loads mutants fuzz soak sanitize compilers pythons test_ranks scaling
 .PHONY: all program objects post units install $(sets_up)
 .DEFAULT_GOAL := all
 
@@ -195,6 +195,15 @@ sanitize:          ## races, addresses, undefined behaviour, valgrind; PARTS='ra
 	@sh tools/setup.sh test
 	@$(submake) BUILD=debug $(parallel) program
 	@MAKE_COMMAND='$(MAKE)' $(venv)/bin/python tests/proof/sanitize/sanitize.py $(PARTS)
+
+compilers:         ## build and test with every gfortran-N, compile with flang, as installed
+	@sh tools/setup.sh test
+	@MAKE_COMMAND='$(MAKE)' $(venv)/bin/python tests/proof/compilers/compilers.py $(COMPILERS)
+
+pythons:           ## perigeo-post with the oldest and newest Python packages that are allowed
+	@sh tools/setup.sh run
+	@$(submake) $(parallel) program
+	@$(venv)/bin/python tests/proof/pythons/pythons.py $(PYTHONS)
 
 bench:             ## measure the speed on this machine; PUBLISH=1: into doc/performance.md
 	@sh tools/setup.sh test
