@@ -69,7 +69,8 @@ studies := fig3a fig3b fig4 fig5 seeds horizon loading size softening influence 
 # Targets that need no compiler, or see to it themselves.
 sets_up := all setup first-footing uninstall wheel demo demo-quick test debug lint verify layers \
   help clean distclean figures $(studies) report report-view gallery tutorials site site-view \
-  bench clouds finite_elements limit_loads mutants fuzz soak sanitize test_ranks scaling
+  bench clouds finite_elements limit_loads mutants fuzz soak sanitize compilers pythons test_ranks \
+  scaling
 .PHONY: program objects post units install $(sets_up)
 .DEFAULT_GOAL := all
 
@@ -205,6 +206,15 @@ sanitize:          ## races, addresses, undefined behaviour, valgrind; PARTS='ra
 	@sh tools/setup.sh test
 	@$(submake) BUILD=debug $(parallel) program
 	@MAKE_COMMAND='$(MAKE)' $(venv)/bin/python tests/proof/sanitize/sanitize.py $(PARTS)
+
+compilers:         ## build and test with every gfortran-N, compile with flang, as installed
+	@sh tools/setup.sh test
+	@MAKE_COMMAND='$(MAKE)' $(venv)/bin/python tests/proof/compilers/compilers.py $(COMPILERS)
+
+pythons:           ## perigeo-post with the oldest and newest Python packages that are allowed
+	@sh tools/setup.sh run
+	@$(submake) $(parallel) program
+	@$(venv)/bin/python tests/proof/pythons/pythons.py $(PYTHONS)
 
 bench:             ## measure the speed on this machine; PUBLISH=1: into doc/performance.md
 	@sh tools/setup.sh test

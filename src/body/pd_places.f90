@@ -225,8 +225,7 @@ contains
   end function rows_of_points
 
   !> The point of the body nearest to a place, looked for in squares around it, each twice as wide
-  !> as the one before. What rows have is known, for in a needle all points may be far from most
-  !> places.
+  !> as the one before. What rows have is known: in a needle points are far from most places.
   pure integer function nearest_point(places, ends, i, j) result(k)
     type(places_t), intent(in) :: places
     integer,        intent(in) :: ends(:, lbound(places%owner, 2):)   !! see rows_of_points

@@ -187,7 +187,7 @@ def test_wrong_geometry_is_named_with_its_place(run_case, tmp_path, mistake):
 
 
 def test_a_needle_is_looked_at_at_once(perigeo, tmp_path):
-    """What lies between lattice lines is sought from thousands of cells far from points."""
+    """What lies between lattice lines is given to points that are thousands of cells away."""
     needle = polygon("0, 0, 2, 0, 2, 1, 1.07, 1, 1.04, 1500, 1.03, 1, 0, 1")
     (tmp_path / "run.nml").write_text(HEAD + needle)
     done = perigeo(["--check", "run.nml"], tmp_path, timeout=30.0)

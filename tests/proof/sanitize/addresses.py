@@ -11,8 +11,9 @@ import sys
 import tempfile
 from pathlib import Path
 
-from common import HERE, ROOT, make, run
+from common import ROOT, make, names_of_suites, run, run_suite
 
+HERE = Path(__file__).resolve().parent
 FOLDER = "sanitize-address"
 CHECKS = "-g -fsanitize=address,undefined -fno-omit-frame-pointer"
 # Of what each suite is linked with all modules are under the checks; a suite itself is quicker
@@ -50,9 +51,10 @@ def settings(reports=None, leaks=True):
 def check(count, inputs, quick=False):
     """Build with the sanitizers, and run what there is."""
     plants(count)
-    suites = QUICK_SUITES if quick else names_of_suites()
+    suites = QUICK_SUITES if quick else names_of_suites("ALIGNED=0")
     goals = ["program", *(f"build/{FOLDER}/unit/{name}" for name in suites)]
-    built = make(FOLDER, FLAGS, *goals, more=[f"unit_flags={SUITE_FLAGS}", "PFUNIT_DIR="])
+    settings_of_make = ("ALIGNED=0", f"FFLAGS={FLAGS}", f"unit_flags={SUITE_FLAGS}")
+    built = make(FOLDER, *settings_of_make, *goals)
     count.note("build with the sanitizers of addresses and undefined behaviour", built)
     if not built:
         return
@@ -62,17 +64,11 @@ def check(count, inputs, quick=False):
         status, said = run([program, "--threads", "1"], text, settings())
         count.note(f"addresses: {name}", status == 0 and "Sanitizer" not in said, said)
     for name in suites:
-        status, said = run_suite(folder / "unit" / name)
+        status, said = run_suite(folder / "unit" / name, settings(leaks=False))
         count.note(f"addresses: {name}", status == 0 and "Sanitizer" not in said, said)
     if not quick:
         for name in CASES:
             run_cases(count, program, name)
-
-
-def names_of_suites():
-    asked = ["make", "-s", "--no-print-directory", "ALIGNED=0", "suites"]
-    done = subprocess.run(asked, cwd=ROOT, check=True, capture_output=True, text=True)
-    return sorted(done.stdout.split())
 
 
 def plants(count):
@@ -91,16 +87,6 @@ def plants(count):
             else:
                 good = done.returncode == FOUND and called in done.stderr
                 count.note(f"a fault planted on purpose is found: {fault}", good, done.stderr)
-
-
-def run_suite(program):
-    with tempfile.TemporaryDirectory(prefix="perigeo-sanitize-") as folder:
-        done = subprocess.run(
-            [program, Path(folder) / "record.txt", "1"], cwd=folder, check=False, text=True,
-            capture_output=True, errors="replace", timeout=900, stdin=subprocess.DEVNULL,
-            env={**os.environ, "PERIGEO_ROOT": str(ROOT), **settings(leaks=False)},
-        )  # fmt: skip
-    return done.returncode, done.stdout + done.stderr
 
 
 def run_cases(count, program, name):

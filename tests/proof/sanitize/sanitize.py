@@ -19,10 +19,12 @@ import sys
 import tempfile
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parent))
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 import addresses
-from common import HERE, ROOT, Count, make, run
+from common import ROOT, Count, make, run
+
+HERE = Path(__file__).resolve().parent
 
 TWO_BLOCKS = 0.05  # spacing of bodies with several blocks of 256 rows
 BODY = """\
@@ -93,7 +95,8 @@ def races(count):
         ["gcc", "-O1", "-g", "-Wall", "-Wextra", "-fsanitize=thread", "-c", HERE / "threads.c",
          "-o", shim], check=True,
     )  # fmt: skip
-    built = make("sanitize-races", flags, "program", more=[f"aligned={shim} -lpthread"])
+    settings = ("ALIGNED=0", f"FFLAGS={flags}", f"aligned={shim} -lpthread")
+    built = make("sanitize-races", *settings, "program")
     count.note("build with the sanitizer of threads", built)
     if not built:
         return
