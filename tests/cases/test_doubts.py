@@ -71,6 +71,7 @@ AT_START = {
     "few_points": (changed(PUSHED, y_max="0.4"), PUSHED),
     "horizon_ratio": (changed(PUSHED, horizon="0.19"), changed(PUSHED, horizon="0.2")),
     "wave_speed": (changed(PUSHED, density="2.0e9"), PUSHED),
+    "density": (changed(PUSHED, density="2.0"), PUSHED),
     "yield_strain": (
         changed(PUSHED, yield_stress="150.0", residual_strength="15.0", kinematic_modulus="-1.5e3"),
         PUSHED,
