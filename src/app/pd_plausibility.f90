@@ -67,7 +67,7 @@ contains
         'Pa (not kPa or MPa), density in kg/m^3 and lengths in m?', '&material')
     end associate
     do k = 1, size(input%materials)
-      if (model%materials%is_used(k)) call look_at_strength(input%materials(k), doubts)
+      if (model%materials%is_used(k)) call look_at_material(input%materials(k), doubts)
     end do
     associate (variation => input%random_field%coefficient_of_variation)
       if (.not. is_set(variation)) return
@@ -79,13 +79,18 @@ contains
     end associate
   end subroutine look_at_scales
 
-  !> Warn of a yield stress that is no part of the stiffness that soil could have, and of what
-  !> Green-Lagrange strain makes of perfect plasticity.
-  subroutine look_at_strength(material, doubts)
+  !> Warn of a density that no soil has, of a yield stress that is no part of the stiffness that soil
+  !> could have, and of what Green-Lagrange strain makes of perfect plasticity.
+  subroutine look_at_material(material, doubts)
     type(material_input_t), intent(in)    :: material
     type(doubts_t),         intent(inout) :: doubts
     real(wp) :: strain, modulus
 
+    associate (density => material%density)
+      if (is_doubtful('density', density)) call doubts%add('density', density, 'the density is '// &
+        short_number(density)//' kg/m^3, and that of soil and rock 500 to 5000: is it in '// &
+        'kg/m^3, not g/cm^3?', '&material name = '//material%name)
+    end associate
     if (material%model /= 'j2') return
     strain = material%yield_stress / material%youngs_modulus
     if (is_doubtful('yield_strain', strain)) call doubts%add('yield_strain', strain, &
@@ -98,7 +103,7 @@ contains
       'nearly perfect plasticity with Green-Lagrange strain: the load falls below the limit '// &
       'load with strain alone, by 3 to 6 % at 0.8 %, and localises; strain_measure = '// &
       '''logarithmic'' stays on it', '&material name = '//material%name)
-  end subroutine look_at_strength
+  end subroutine look_at_material
 
   !> Warn of ground under horizontal stress that nothing bears but the load that holds it.
   subroutine look_at_ground(input, doubts)

@@ -32,6 +32,7 @@ module pd_doubt_list
     doubt_kind_t('few_points', 'start', 'points of the body', lower=50.0_wp), &
     doubt_kind_t('horizon_ratio', 'start', 'horizon over spacing, m', lower=2.0_wp), &
     doubt_kind_t('wave_speed', 'start', 'speed of waves, c_p [m/s]', 10.0_wp, 1.0e4_wp), &
+    doubt_kind_t('density', 'start', 'density of a material [kg/m^3]', lower=100.0_wp), &
     doubt_kind_t('yield_strain', 'start', 'strain at yield, yield_stress / youngs_modulus', &
     1.0e-5_wp, 0.1_wp), &
     doubt_kind_t('perfect_plasticity', 'start', 'kinematic_modulus or isotropic_modulus, the '// &

@@ -267,7 +267,8 @@ contains
     end do
   end subroutine check_equilibrium
 
-  !> Everything that needs platens, and whether they approach each other.
+  !> Everything that needs platens, and whether they approach each other: told of the first key that
+  !> needs it, for one mistake makes one message.
   subroutine check_platens(input, groups, errors)
     type(input_t),          intent(in)    :: input
     type(namelist_group_t), intent(in)    :: groups(:)
@@ -275,14 +276,20 @@ contains
     type(namelist_group_t) :: integration, output
     type(table_t) :: approach
     real(wp) :: extent
+    integer :: before
 
+    before = errors%count()
     if (any_damaged(groups, 'boundary')) return   ! what could not be read may be a platen's motion
     integration = group_named(groups, 'integration', 1, input%path)
     output = group_named(groups, 'output', 1, input%path)
     if (input%platens(1) == 0) then
-      if (is_given(integration, 'final_strain')) call refuse(integration, 'final_strain')
-      if (is_given(output, 'frame_strains')) call refuse(output, 'frame_strains')
-      if (input%integration%damping_frame == 'platens') call refuse(integration, 'damping_frame')
+      if (is_given(integration, 'final_strain')) then
+        call refuse(integration, 'final_strain')
+      else if (is_given(output, 'frame_strains')) then
+        call refuse(output, 'frame_strains')
+      else if (input%integration%damping_frame == 'platens') then
+        call refuse(integration, 'damping_frame')
+      end if
       return
     end if
     if (approach_unknown(input)) return
@@ -290,7 +297,7 @@ contains
     extent = platen_extent(input)
     if (is_set(input%integration%final_strain)) &
       call check_reached(input%integration%final_strain, integration, 'final_strain')
-    if (size(input%output%frame_strains) > 0) &
+    if (size(input%output%frame_strains) > 0 .and. errors%count() == before) &
       call check_reached(maxval(input%output%frame_strains), output, 'frame_strains')
 
   contains

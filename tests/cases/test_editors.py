@@ -18,6 +18,21 @@ def test_one_mistake_makes_one_message(run_case, tmp_path, mistake):
     assert done.stderr.count("error: ") == 1, done.stderr
 
 
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("velocity = 0.0, -0.01", "velocity = 0.0, 0.01"),  # apart
+        ("&boundary name = 'bottom', side = 'bottom' /\n", ""),  # no platens
+    ],
+)
+def test_platens_that_do_not_press_are_told_once(run_case, tmp_path, old, new):
+    """Although final_strain, frame_strains and damping_frame all need them."""
+    assert old in SPECIMEN
+    done = run_case(SPECIMEN.replace(old, new), tmp_path, "--check")
+    assert done.returncode == 2
+    assert done.stderr.count("error: ") == 1, done.stderr
+
+
 @pytest.mark.parametrize("encoding", ["utf-8", "utf-8-sig", "latin-1"])
 @pytest.mark.parametrize("line_end", ["\n", "\r\n", "\r"])
 def test_inputs_of_all_editors_are_read(run_case, tmp_path, encoding, line_end):
