@@ -6,11 +6,12 @@
 !> MPI ends all ranks (MPI_ERRORS_ARE_FATAL).
 module pd_ranks
   use, intrinsic :: iso_fortran_env, only: error_unit, output_unit
-  use mpi_f08, only: mpi_abort, mpi_allgatherv, mpi_allreduce, mpi_bcast, mpi_bor, &
-    mpi_comm_rank, mpi_comm_size, mpi_comm_world, mpi_double_precision, mpi_finalize, &
-    mpi_iallreduce, mpi_in_place, mpi_init_thread, mpi_integer, mpi_integer8, mpi_irecv, &
-    mpi_isend, mpi_max, mpi_min, mpi_recv, mpi_request, mpi_send, mpi_status_ignore, &
-    mpi_statuses_ignore, mpi_testall, mpi_thread_funneled, mpi_waitall
+  use mpi_f08, only: mpi_abort, mpi_allgatherv, mpi_allreduce, mpi_bcast, mpi_bor, mpi_comm, &
+    mpi_comm_free, mpi_comm_rank, mpi_comm_size, mpi_comm_split_type, mpi_comm_type_shared, &
+    mpi_comm_world, mpi_double_precision, mpi_finalize, mpi_iallreduce, mpi_in_place, &
+    mpi_info_null, mpi_init_thread, mpi_integer, mpi_integer8, mpi_irecv, mpi_isend, mpi_max, &
+    mpi_min, mpi_recv, mpi_request, mpi_send, mpi_status_ignore, mpi_statuses_ignore, &
+    mpi_testall, mpi_thread_funneled, mpi_waitall
   use pd_kinds, only: wp
   implicit none
   private
@@ -22,6 +23,7 @@ module pd_ranks
   type :: ranks_t
     integer :: count = 1
     integer :: mine = 0
+    integer :: on_machine = 1           !! ranks that share the memory of this one's machine
     integer, allocatable :: before(:)   !! blocks before those of each rank, and all (0:count)
   contains
     procedure :: total
@@ -54,11 +56,15 @@ contains
   !> Begin: who takes part.
   subroutine begin_ranks(ranks)
     type(ranks_t), intent(out) :: ranks
+    type(mpi_comm) :: beside
     integer :: provided
 
     call mpi_init_thread(mpi_thread_funneled, provided)
     call mpi_comm_size(mpi_comm_world, ranks%count)
     call mpi_comm_rank(mpi_comm_world, ranks%mine)
+    call mpi_comm_split_type(mpi_comm_world, mpi_comm_type_shared, 0, mpi_info_null, beside)
+    call mpi_comm_size(beside, ranks%on_machine)
+    call mpi_comm_free(beside)
   end subroutine begin_ranks
 
   !> End, all ranks together.

@@ -16,7 +16,6 @@ module pd_check
   use pd_ranks, only: begin_ranks, ranks_t
   use pd_room, only: machine_memory
   use pd_run, only: run_t
-  use pd_setup, only: looks_near
   use pd_size, only: memory_in_words
   use pd_stability, only: find_highest_frequency
   use pd_summary, only: estimated_seconds, memory_of_run, seconds_of_step, summarise, summary_t
@@ -27,9 +26,6 @@ module pd_check
   private
 
   public :: begin_program, print_check
-
-  !> Memory that a rank needs for every point of the whole body: row and boundary [bytes].
-  real(wp), parameter :: of_point = 12.0_wp
 
 contains
 
@@ -99,8 +95,9 @@ contains
     call outcome%end_if_any(errors, exit_file)
     if (outcome%done) return
     call find_highest_frequency(run%model)
-    associate (bytes => memory_of_run(run%input, run%model))   ! a run is refused for it
-      if (bytes > machine_memory()) write (output_unit, '(a)') 'warning: '//memory_in_words(bytes)
+    associate (bytes => memory_of_run(run%input, run%model) / real(run%ranks%count, wp))
+      if (real(run%ranks%on_machine, wp) * bytes > machine_memory()) &   ! a run is refused for it
+        write (output_unit, '(a)') 'warning: '//memory_in_words(bytes, run%ranks)
     end associate
     summary = summarise(run%input, run%model, run%clock, run%schedule)
     write (output_unit, '(a)') path//': the input is right'
@@ -144,10 +141,10 @@ contains
     if (.not. run%model%at_equilibrium) call line('efficiency', 'about '//short_number( &
       efficiency(run%model, of_rank, sent))//' with 2e-6 s and 1e10 bytes/s per message')
     associate (part => real(maxval(of_rank%rows + of_rank%halo), wp) / run%model%operators%n)
-      call line('memory of a rank', short_number(1.0e-6_wp * (part &
-        * memory_of_run(run%input, run%model) + of_point * run%model%body%n))//' MB at most')
+      call line('memory of a rank', short_number(1.0e-6_wp * part &
+        * memory_of_run(run%input, run%model))//' MB at most')
     end associate
-    if (.not. set_up_in_parts(run)) call line('set-up', 'that of the whole body, by every rank')
+    if (run%model%body%runs%n == 0) call line('set-up', 'that of the whole body, by every rank')
     if (words_on_cores(run%ranks%count) /= '') call line('cores', words_on_cores(run%ranks%count))
   end subroutine print_shares
 
@@ -159,15 +156,6 @@ contains
     column = label
     write (output_unit, '(a)') '  '//column//text
   end subroutine line
-
-  !> Whether every rank sets up its own rows of the model only.
-  logical function set_up_in_parts(run)
-    type(run_t), intent(in) :: run
-
-    set_up_in_parts = allocated(run%model%body%place) .and. run%model%operators%hidden_bonds == 0 &
-      .and. run%input%run%operators /= 'list'
-    if (set_up_in_parts) set_up_in_parts = looks_near(run%input, run%model)
-  end function set_up_in_parts
 
   !> Time of a step without messages, all ranks being equal, over that of the rank with most points.
   !> Rows that need none of other ranks are worked on while the halo is on its way.

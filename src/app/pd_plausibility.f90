@@ -33,7 +33,7 @@ contains
         'no point has the material '''//model%materials%list(k)%name// &
         '''; &body material chooses one', input%path)
     end do
-    n = count(model%body%boundary == 0)
+    n = model%body%n - size(model%body%points_beside())
     if (is_doubtful('few_points', real(n, wp))) call doubts%add('few_points', real(n, wp), &
       'the body has only '//integer_text(n)//' points: too few to show a field of stress', &
       '&discretisation spacing')
@@ -45,7 +45,7 @@ contains
     end associate
     call look_at_scales(input, model, doubts)
     if (is_set(input%initial_stress%k0)) call look_at_ground(input, doubts)
-    if (.not. allocated(model%body%place)) call look_at_cloud(input, model, doubts)
+    if (.not. model%body%on_lattice()) call look_at_cloud(input, model, doubts)
     do k = 1, model%loads%count()
       associate (load => model%loads%items(k)%load)
         if (allocated(load%doubt)) call doubts%add('thin_body', load%doubted, load%doubt, &

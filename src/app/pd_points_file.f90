@@ -94,10 +94,9 @@ contains
     associate (body => model%body)
       do i = 1, body%n
         boundary = '-'
-        if (body%boundary(i) > 0) boundary = input%boundaries(body%boundary(i))%name
-        call put(unit, 'point '// &
-          numbers([body%position(i, 1), body%position(i, 2), body%volume(i)])//' '// &
-          input%bodies(body%part(i))%material//' '//boundary, good)
+        if (body%boundary_of(i) > 0) boundary = input%boundaries(body%boundary_of(i))%name
+        call put(unit, 'point '//numbers([body%position_of(i), body%volume_of(i)])//' '// &
+          input%bodies(body%part_of(i))%material//' '//boundary, good)
       end do
     end associate
   end subroutine put_points

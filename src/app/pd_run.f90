@@ -99,7 +99,7 @@ contains
     if (outcome%done) return
 
     allocate (run%stages, source=stages_of(run%input))
-    call look_at_size(run%input, options%check, errors)
+    call look_at_size(run%input, run%ranks, options%check, errors)
     call spare_threads(options%threads, run%ranks%count, run%input)
     if (errors%count() == 0) call set_up_bodies(run, input_errors, errors)
     call outcome%end_if_any(input_errors, exit_input)
@@ -186,7 +186,7 @@ contains
       if (errors%count() > 0) call errors%add('that is in the stage '''//run%stages(k)%name//'''')
     end do
     if (errors%count() == 0 .and. .not. only_checked) &
-      call look_at_memory(run%input, run%model, errors)
+      call look_at_memory(run%input, run%model, run%ranks, errors)
   end subroutine try_later_stages
 
   !> Increments of the present stage.

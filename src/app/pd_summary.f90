@@ -61,7 +61,7 @@ contains
       call summary%add('body', number(body%upper(1) - body%lower(1))//' m x '// &
         number(body%upper(2) - body%lower(2))//' m')
       call summary%add('points', whole(body%n)//', of which fictitious '// &
-        whole(count(body%boundary > 0)))
+        whole(size(body%points_beside())))
       call model%operators%fewest_bonds(fewest, point)
       call summary%add('bonds', number(bonds)//'; per point '// &
         number(bonds / real(body%n, wp))// &
@@ -190,7 +190,7 @@ contains
 
     associate (row => model%operators%storage%row(), rows => model%operators%n)
       associate (strength => model%strength(row), here => model%materials%rows_of(k, rows))
-        inside = model%body%boundary == 0 .and. here(row)
+        inside = model%body%boundaries([1, model%body%n]) == 0 .and. here(row)
         if (.not. any(inside)) return   ! it is that of no body
         spread = spread_of(strength, model%points%volume(row), inside)
         weaker = 0

@@ -14,6 +14,7 @@ module pd_ranks
   type :: ranks_t
     integer :: count = 1
     integer :: mine = 0
+    integer :: on_machine = 1           !! ranks that share the memory of this one's machine
     integer, allocatable :: before(:)   !! blocks before those of each rank, and all (0:count)
   contains
     procedure, nopass :: total

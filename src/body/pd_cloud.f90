@@ -3,8 +3,8 @@
 !>
 !> Source: doc/input.md, point clouds.
 module pd_cloud
+  use pd_body, only: body_t
   use pd_errors, only: error_list_t
-  use pd_geometry, only: body_t
   use pd_kinds, only: wp
   use pd_plain_text, only: letter_length, make_plain, meant_by
   use pd_text, only: integer_text, read_number

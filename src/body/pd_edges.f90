@@ -4,7 +4,7 @@
 !> polygons are given by their vertices.
 !> Source: doc/theory.md, section 7.
 module pd_edges
-  use pd_geometry, only: body_t
+  use pd_body, only: body_t
   use pd_kinds, only: wp
   implicit none
   private

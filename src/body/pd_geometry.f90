@@ -1,40 +1,33 @@
-!> The body: reference points, their volumes, and the sets of fictitious points.
+!> Points from shapes on a lattice.
 !>
-!> Points come from shapes on one lattice or from a cloud; both are fixed after set-up.
+!> A lattice whose points are kept in runs is looked at strip by strip, so that no rank ever has
+!> memory for all of its places.
 !> Source: doc/theory.md, sections 1 and 7.
 module pd_geometry
+  use pd_body, only: body_t, grid_t
+  use pd_body_sides, only: find_sides
   use pd_errors, only: error_list_t
-  use pd_kinds, only: l1, wp
+  use pd_kinds, only: wp
   use pd_layers, only: fill_edges, fill_layer, go_on_over_layers, layer_t
-  use pd_places, only: empty, give_slivers, lattice_t, new_places, places_t, volume_at
+  use pd_places, only: empty, give_slivers, lattice_t, new_places, outer_lines, places_t, volume_at
   use pd_point_sets, only: side_t
-  use pd_region, only: area_within, box_of, length_within, shape_t
-  use pd_sides, only: bottom, left, normal_axis, outward, right, side_count, side_names, top
+  use pd_polygons, only: edge_axis
+  use pd_region, only: area_within, box_of, shape_t
+  use pd_runs, only: runs_t
+  use pd_sides, only: bottom, left, right, top
+  use pd_sight, only: sees_all
   use pd_text, only: integer_text
   implicit none
   private
 
   public :: body_t, lattice_t, layer_t, shape_t, lattice_body, region_body, nearest_count
 
-  !> Reference points in the order of the rows of the lattice (y slow, x fast), or of the file.
-  type :: body_t
-    integer :: n = 0                            !! points, fictitious ones included
-    real(wp), allocatable :: position(:, :)     !! X (n,2) [m]
-    real(wp), allocatable :: volume(:)          !! V (n) per unit thickness [m^2]
-    integer,  allocatable :: boundary(:)        !! 0: body, k: fictitious point of boundary k (n)
-    integer,  allocatable :: part(:)            !! number of the shape that a point lies in, or
-                                                !! that its layer continues (n)
-    integer,  allocatable :: place(:, :)        !! column and row on the lattice (n,2); not
-                                                !! allocated: no lattice
-    integer,  allocatable :: box(:, :)          !! lowest and highest column and row of the points
-                                                !! of all stages (2,2); not allocated: no stages
-    real(wp) :: lower(2) = 0.0_wp               !! corners of the extent of the body without
-    real(wp) :: upper(2) = 0.0_wp               !! fictitious points, as used [m]
-    logical(l1), allocatable :: filled(:, :)    !! square above and right of the lattice line at a
-                                                !! place is material, layers included (columns,
-                                                !! rows of places, with a margin); not for a cloud
-    type(side_t) :: sides(side_count)           !! by number (`pd_sides`); not for a cloud
-  end type body_t
+  !> What the strips of a lattice hold.
+  type :: found_t
+    logical, allocatable :: shape(:)   !! there is a place of the shape
+    logical, allocatable :: layer(:)   !! there is a point of the layer
+    logical :: near = .true.           !! no bond crosses what is no material
+  end type found_t
 
 contains
 
@@ -83,10 +76,11 @@ contains
     type(layer_t),   intent(in)    :: layers(:)
     type(body_t),    intent(out)   :: body
     type(error_list_t), intent(inout) :: errors
-    type(shape_t)  :: moved(size(shapes))
-    type(places_t) :: places
-    real(wp) :: box(2, 2), corner(2), start(2)
-    integer  :: k
+    type(shape_t)   :: moved(size(shapes))
+    type(lattice_t) :: apart
+    real(wp) :: box(2, 2), start(2)
+    logical  :: near
+    integer  :: before, k
 
     box = box_of(shapes)
     start = real(floor(box(:, 1) + 1.0e-6_wp), wp)
@@ -94,53 +88,199 @@ contains
     do k = 1, size(shapes)
       moved(k)%vertices = shapes(k)%vertices - spread(start, 2, size(shapes(k)%vertices, 2))
     end do
-    corner = origin + start * lattice%spacing
-    body%lower = corner + (box(:, 1) - start) * lattice%spacing
-    body%upper = corner + (box(:, 2) - start) * lattice%spacing
+    body%grid = grid_t(origin + start * lattice%spacing, merge(0.5_wp, 0.0_wp, lattice%cells), &
+      lattice%spacing)
+    body%lower = body%grid%origin + (box(:, 1) - start) * lattice%spacing
+    body%upper = body%grid%origin + (box(:, 2) - start) * lattice%spacing
 
-    call new_places(moved, lattice, places)
-    call look_at_shapes(places, errors)
+    before = errors%count()
+    apart = lattice
+    apart%in_runs = lattice%in_runs .and. may_be_in_strips(moved, lattice, layers)
+    call fill_body(moved, apart, layers, body, near, errors)
+    if (errors%count() > before .or. near .or. .not. apart%in_runs) return
+    apart%in_runs = .false.   ! to know which bonds are not there takes the whole lattice
+    call fill_body(moved, apart, layers, body, near, errors)
+  end subroutine region_body
+
+  !> Whether a strip of the lattice tells what its points are: no layer follows an edge or mirrors
+  !> the body, and no cell without a point holds a sliver for a point elsewhere.
+  pure logical function may_be_in_strips(shapes, lattice, layers) result(may)
+    type(shape_t),   intent(in) :: shapes(:)
+    type(lattice_t), intent(in) :: lattice
+    type(layer_t),   intent(in) :: layers(:)
+    integer :: i, k
+
+    may = all(layers%shape == 0) .and. .not. any(layers%mirror)
+    if (.not. lattice%tributary) return
+    do k = 1, size(shapes)
+      associate (v => shapes(k)%vertices)
+        may = may .and. all(abs(v - anint(v)) <= 0.0_wp)
+        do i = 1, size(v, 2)
+          may = may .and. edge_axis(v, i) > 0
+        end do
+      end associate
+    end do
+  end function may_be_in_strips
+
+  !> The points, strip by strip where they are kept in runs, all at once otherwise.
+  subroutine fill_body(shapes, lattice, layers, body, near, errors)
+    type(shape_t),   intent(in)    :: shapes(:)   !! from lattice line 0, 0
+    type(lattice_t), intent(in)    :: lattice
+    type(layer_t),   intent(in)    :: layers(:)
+    type(body_t),    intent(inout) :: body        !! in: with its grid
+    logical,         intent(out)   :: near        !! in runs: no bond crosses what is no material
+    type(error_list_t), intent(inout) :: errors
+    type(found_t) :: found
+    integer :: ends(2), first, k, lines
+
+    allocate (found%shape(size(shapes)), found%layer(size(layers)), source=.false.)
+    body%n = 0
+    body%runs = runs_t()
+    body%sides = side_t()
+    ends = outer_lines(shapes, lattice)
+    lines = ends(2) - ends(1) + 1
+    if (lattice%in_runs) &
+      lines = max(4 * lines_beside(lattice), lattice%strip / lines_across(shapes))
+    do first = ends(1), ends(2), lines
+      call add_strip(shapes, lattice, layers, [first, min(ends(2), first + lines - 1)], body, &
+        found, errors)
+      if (errors%count() > 0) return
+    end do
+    near = found%near
+    do k = 1, size(layers)
+      if (.not. found%layer(k)) &
+        call errors%add('a boundary holds no point', place_of_layer(shapes, layers(k)))
+    end do
+  end subroutine fill_body
+
+  !> Points between two rows.
+  subroutine add_strip(shapes, lattice, layers, rows, body, found, errors)
+    type(shape_t),   intent(in)    :: shapes(:)
+    type(lattice_t), intent(in)    :: lattice
+    type(layer_t),   intent(in)    :: layers(:)
+    integer,         intent(in)    :: rows(2)     !! first and last
+    type(body_t),    intent(inout) :: body        !! in: with the points of all rows before
+    type(found_t),   intent(inout) :: found
+    type(error_list_t), intent(inout) :: errors
+    type(places_t) :: places
+    type(body_t)   :: strip
+    integer :: ends(2), k
+
+    ends = outer_lines(shapes, lattice)
+    associate (beside => lines_beside(lattice))
+      call new_places(shapes, lattice, [max(ends(1), rows(1) - beside), &
+        min(ends(2), rows(2) + beside)], places)
+    end associate
+    do k = 1, size(shapes)
+      found%shape(k) = found%shape(k) .or. any(places%part == k)
+    end do
+    if (rows(2) == ends(2)) call look_at_shapes(shapes, found%shape, errors)
     if (errors%count() > 0) return
+    call fill_layers(layers, body%grid%origin, lattice, places)
+    do k = 1, size(layers)
+      found%layer(k) = found%layer(k) .or. any(places%owner(:, rows(1):rows(2)) &
+        == layers(k)%boundary)
+    end do
+    call join_layers(lattice, places)
+    strip%grid = body%grid
+    call number_points(places, lattice, strip)
+    call find_parts(places, strip)
+    call find_sides(places, rows, body%n - count(strip%place(:, 2) < rows(1)), body)
+    call move_alloc(places%filled, strip%filled)
+    if (.not. lattice%in_runs) then
+      call move_points(strip, body)
+      return
+    end if
+    if (found%near .and. .not. lattice%through_air) &
+      found%near = sees_all(strip, places%number, rows, lattice%cells, lattice%reach)
+    call append(strip, rows, body%runs)
+    body%n = body%runs%n
+  end subroutine add_strip
+
+  !> Rows of places beside a strip from which it is known what its points are, and which of their
+  !> bonds stay in material.
+  pure integer function lines_beside(lattice) result(lines)
+    type(lattice_t), intent(in) :: lattice
+
+    lines = 2 * lattice%rows + ceiling(lattice%reach) + 4
+  end function lines_beside
+
+  !> Columns that the solids touch.
+  pure integer function lines_across(shapes)
+    type(shape_t), intent(in) :: shapes(:)
+    real(wp) :: box(2, 2)
+
+    box = box_of(shapes)
+    lines_across = max(1, ceiling(box(1, 2) - box(1, 1)))
+  end function lines_across
+
+  !> All fictitious layers.
+  subroutine fill_layers(layers, origin, lattice, places)
+    type(layer_t),   intent(in)    :: layers(:)
+    real(wp),        intent(in)    :: origin(2)   !! of lattice line 0, 0 [m]
+    type(lattice_t), intent(in)    :: lattice
+    type(places_t),  intent(inout) :: places
+    integer :: k
+
     do k = 1, size(layers)
       if (layers(k)%shape > 0) then
         call fill_edges(layers(k), layers, lattice, places)
       else
-        call fill_layer(layers(k), layers, corner, lattice, places)
+        call fill_layer(layers(k), layers, origin, lattice, places)
       end if
     end do
     do k = 1, size(layers)
-      call go_on_over_layers(layers(k), corner, lattice, places)
+      call go_on_over_layers(layers(k), origin, lattice, places)
     end do
-    do k = 1, size(layers)
-      if (.not. any(places%owner == layers(k)%boundary)) &
-        call errors%add('a boundary holds no point', place_of_layer(shapes, layers(k)))
+  end subroutine fill_layers
+
+  !> The points of a strip between two rows go behind those that are in runs.
+  pure subroutine append(strip, rows, runs)
+    type(body_t), intent(in)    :: strip
+    integer,      intent(in)    :: rows(2)
+    type(runs_t), intent(inout) :: runs
+    integer :: i
+
+    do i = 1, strip%n
+      if (strip%place(i, 2) < rows(1) .or. strip%place(i, 2) > rows(2)) cycle
+      call runs%append(strip%place(i, :), strip%volume(i), strip%boundary(i), strip%part(i))
     end do
-    call join_layers(lattice, places)
-    call number_points(places, corner, lattice, body)
-    call find_parts(places, body)
-    call find_sides(places, corner, lattice, body)
-    call move_alloc(places%filled, body%filled)
-  end subroutine region_body
+  end subroutine append
+
+  !> The points of all strips, which is one.
+  subroutine move_points(strip, body)
+    type(body_t), intent(inout) :: strip
+    type(body_t), intent(inout) :: body
+
+    body%n = strip%n
+    call move_alloc(strip%position, body%position)
+    call move_alloc(strip%volume, body%volume)
+    call move_alloc(strip%boundary, body%boundary)
+    call move_alloc(strip%part, body%part)
+    call move_alloc(strip%place, body%place)
+    call move_alloc(strip%filled, body%filled)
+  end subroutine move_points
 
   !> Check that every solid has points of its own, and that every hole takes something away.
-  subroutine look_at_shapes(places, errors)
-    type(places_t),     intent(in)    :: places
+  subroutine look_at_shapes(shapes, seen, errors)
+    type(shape_t),      intent(in)    :: shapes(:)
+    logical,            intent(in)    :: seen(:)    !! there are points of it
     type(error_list_t), intent(inout) :: errors
     real(wp), parameter :: hardly = 1.0e-6_wp
     real(wp) :: box(2, 2)
     integer  :: k
 
-    do k = 1, size(places%shapes)
-      if (places%shapes(k)%solid) then
-        if (.not. any(places%part == k)) call errors%add('a body leaves no point', &
-          place_of_body(places%shapes, k), 'later bodies cover it, or it lies between '// &
+    do k = 1, size(shapes)
+      if (shapes(k)%solid) then
+        if (.not. seen(k)) call errors%add('a body leaves no point', &
+          place_of_body(shapes, k), 'later bodies cover it, or it lies between '// &
           'the places of the lattice', 'at least one point of its own')
       else
-        box(:, 1) = minval(places%shapes(k)%vertices, 2)
-        box(:, 2) = maxval(places%shapes(k)%vertices, 2)
-        if (area_within(places%shapes(:k - 1), box(:, 1), box(:, 2)) &
-          - area_within(places%shapes(:k), box(:, 1), box(:, 2)) <= hardly) call errors%add( &
-          'a hole takes nothing away', place_of_body(places%shapes, k), &
+        box(:, 1) = minval(shapes(k)%vertices, 2)
+        box(:, 2) = maxval(shapes(k)%vertices, 2)
+        if (area_within(shapes(:k - 1), box(:, 1), box(:, 2)) &
+          - area_within(shapes(:k), box(:, 1), box(:, 2)) <= hardly) call errors%add( &
+          'a hole takes nothing away', place_of_body(shapes, k), &
           'no solid before it lies there', 'a hole in one of the bodies before it')
       end if
     end do
@@ -209,22 +349,22 @@ contains
     end do
   end subroutine find_parts
 
-  !> Number the occupied places row by row, and give them positions and volumes.
-  subroutine number_points(places, origin, lattice, body)
+  !> Number the occupied places row by row, and give them positions and volumes. The outermost rows
+  !> of places are left out: they hold no point, or it is not all known.
+  subroutine number_points(places, lattice, body)
     type(places_t),  intent(inout) :: places
-    real(wp),        intent(in)    :: origin(2)
     type(lattice_t), intent(in)    :: lattice
-    type(body_t),    intent(inout) :: body
-    integer  :: ix, iy, k, low(2), high(2)
-    real(wp) :: offset
+    type(body_t),    intent(inout) :: body    !! in: with its grid
+    integer :: ix, iy, k, low(2), high(2)
 
     call occupied_box(places, low, high)
-    body%n = count(places%owner /= empty)
+    low(2) = max(low(2), lbound(places%owner, 2) + 1)
+    high(2) = min(high(2), ubound(places%owner, 2) - 1)
+    body%n = count(places%owner(:, low(2):high(2)) /= empty)
     allocate (body%position(body%n, 2), body%volume(body%n), source=0.0_wp)
     allocate (body%boundary(body%n), body%place(body%n, 2), source=0)
     allocate (places%number, mold=places%owner)
     places%number = 0
-    offset = merge(0.5_wp, 0.0_wp, lattice%cells)
     k = 0
     do iy = low(2), high(2)
       do ix = low(1), high(1)
@@ -232,7 +372,7 @@ contains
         k = k + 1
         places%number(ix, iy) = k
         body%place(k, :) = [ix, iy]
-        body%position(k, :) = origin + (real([ix, iy], wp) + offset) * lattice%spacing
+        body%position(k, :) = body%grid%position([ix, iy])
         body%boundary(k) = places%owner(ix, iy)
         body%volume(k) = 1.0_wp
         if (lattice%tributary) body%volume(k) = volume_at(places, lattice, ix, iy)
@@ -241,83 +381,6 @@ contains
     if (lattice%tributary) call give_slivers(places, lattice, body%volume)
     body%volume = body%volume * lattice%spacing**2
   end subroutine number_points
-
-  !> Points on the outermost line of the body at each side. Parts of the body that are set back from
-  !> that line do not belong to the side.
-  subroutine find_sides(places, origin, lattice, body)
-    type(places_t),  intent(in)    :: places
-    real(wp),        intent(in)    :: origin(2)
-    type(lattice_t), intent(in)    :: lattice
-    type(body_t),    intent(inout) :: body
-    integer :: k
-
-    do k = 1, side_count
-      associate (side => body%sides(k), along => 3 - normal_axis(side_names(k)), &
-        line => places%line(k))
-        if (along == 1) then
-          call find_side(places, lbound(places%number, 1), places%number(:, line), k, origin(1), &
-            lattice, side)
-        else
-          call find_side(places, lbound(places%number, 2), places%number(line, :), k, origin(2), &
-            lattice, side)
-        end if
-        side%name = trim(side_names(k))
-        side%axis = 3 - along
-        side%outward = outward(side%name)
-        side%lower = body%lower(along)
-        side%upper = body%upper(along)
-      end associate
-    end do
-  end subroutine find_sides
-
-  !> The points of one line of places, and the part of the side that each has.
-  pure subroutine find_side(places, first, number, k, origin, lattice, side)
-    type(places_t),  intent(in)    :: places
-    integer,         intent(in)    :: first             !! index of the first place
-    integer,         intent(in)    :: number(first:)
-    integer,         intent(in)    :: k                 !! number of the side
-    real(wp),        intent(in)    :: origin            !! coordinate of place 0 [m]
-    type(lattice_t), intent(in)    :: lattice
-    type(side_t),    intent(inout) :: side
-    real(wp) :: ends(2)
-    integer  :: i, n
-
-    allocate (side%points(count(number > 0)))
-    allocate (side%from(size(side%points)), side%to(size(side%points)))
-    n = 0
-    do i = first, ubound(number, 1)
-      if (number(i) == 0) cycle
-      n = n + 1
-      ends = [0.0_wp, 1.0_wp]
-      if (.not. lattice%cells) ends = [-part_of_side(places, k, i, -1, number(i - 1) > 0), &
-        part_of_side(places, k, i, 1, number(i + 1) > 0)]
-      side%points(n) = number(i)
-      side%from(n) = origin + (real(i, wp) + ends(1)) * lattice%spacing
-      side%to(n) = origin + (real(i, wp) + ends(2)) * lattice%spacing
-    end do
-  end subroutine find_side
-
-  !> How far the part of side k that belongs to the point at place i goes in a direction [spacings]:
-  !> halfway to the next point, or to the end of the side.
-  pure real(wp) function part_of_side(places, k, i, direction, has_next) result(part)
-    type(places_t), intent(in) :: places
-    integer,        intent(in) :: k, i, direction
-    logical,        intent(in) :: has_next    !! there is a point at the next place
-    real(wp), parameter :: just_inside = 1.0e-4_wp
-    real(wp) :: ends(2)
-    integer  :: along, square(2)
-
-    along = 3 - normal_axis(side_names(k))
-    square(along) = i + min(direction, 0)
-    square(3 - along) = places%line(k) - merge(1, 0, outward(side_names(k)) > 0)
-    part = 0.0_wp
-    if (.not. places%filled(square(1), square(2))) return
-    part = 0.5_wp
-    if (places%whole(square(1), square(2))) return
-    ends = real(i, wp) + merge(0.5_wp, 1.0_wp, has_next) * [min(direction, 0), max(direction, 0)]
-    part = length_within(places%shapes, along, places%box(3 - along, merge(2, 1, &
-      outward(side_names(k)) > 0)) - just_inside * real(outward(side_names(k)), wp), ends)
-  end function part_of_side
 
   !> Lowest and highest column and row that hold a point.
   pure subroutine occupied_box(places, low, high)

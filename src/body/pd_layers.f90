@@ -33,17 +33,18 @@ contains
   !> row, or those strictly inside a span. Where layers of two whole sides meet, the corner block
   !> belongs to the bottom or top side.
   !>
-  !> The squares extend one row beyond the points: the outermost row stands for a body that goes
-  !> on, so that its points have whole cells across the layer.
+  !> Squares go one row beyond the points, as if the body went on: these have whole cells across it.
   subroutine fill_layer(layer, layers, origin, lattice, places)
     type(layer_t),   intent(in)    :: layer
     type(layer_t),   intent(in)    :: layers(:)
     real(wp),        intent(in)    :: origin(2)   !! of lattice line 0, 0 [m]
     type(lattice_t), intent(in)    :: lattice
     type(places_t),  intent(inout) :: places
-    integer :: on_line(2), squares(2), p, inner
+    integer :: on_line(2), squares(2), p, inner, low, high   ! rows of places from low to high
 
     p = lattice%rows
+    low = lbound(places%owner, 2)
+    high = ubound(places%owner, 2)
     inner = merge(0, 1, lattice%cells)   ! from the square of a line to the one next inside
     call find_range(layer, origin(2), places%line([bottom, top]), places%squares(:, 2), lattice, &
       on_line, squares)
@@ -69,8 +70,8 @@ contains
       integer :: k, square
 
       square = x - merge(inner, 0, step > 0)
-      associate (owner => places%owner, a => on_line(1), b => on_line(2), c => squares(1), &
-        d => squares(2))
+      associate (owner => places%owner, a => max(on_line(1), low), b => min(on_line(2), high), &
+        c => max(squares(1), low), d => min(squares(2), high))
         do k = 1, p + 1
           if (k <= p) where (owner(x, a:b) == 0) owner(x + step * k, a:b) = layer%boundary
           where (places%filled(square, c:d))
@@ -84,18 +85,19 @@ contains
     !> Layers beyond the points of row y, in direction step; on a whole side corner blocks included.
     subroutine fill_row(y, step)
       integer, intent(in) :: y, step
-      integer :: k, row, square_row, columns(2)
+      integer :: k, row, square_row, columns(2), edge
 
       square_row = y - merge(inner, 0, step > 0)
+      edge = merge(high, low, step > 0)   ! the last row, in this direction
       associate (owner => places%owner, a => on_line(1), b => on_line(2), c => squares(1), &
         d => squares(2), first => places%line(left), last => places%line(right))
         columns = [first, last]
-        if (.not. allocated(layer%span)) then
+        if (.not. allocated(layer%span) .and. y >= low .and. y <= high) then
           if (any_on(layers, left) .and. owner(first, y) == 0) columns(1) = first - p
           if (any_on(layers, right) .and. owner(last, y) == 0) columns(2) = last + p
         end if
-        do k = 1, p + 1
-          if (k <= p) then
+        do k = 1, min(p + 1, step * (edge - square_row))
+          if (k <= min(p, step * (edge - y))) then
             where (owner(a:b, y) == 0) owner(a:b, y + step * k) = layer%boundary
             owner(columns(1):first - 1, y + step * k) = layer%boundary
             owner(last + 1:columns(2), y + step * k) = layer%boundary
@@ -414,11 +416,8 @@ contains
         if (places%owner(i, j) /= empty) cycle
         apart = real([i, j], wp) + offset - corner
         if (dot_product(apart, back) > 0.0_wp .or. dot_product(apart, ahead) > 0.0_wp) cycle
-        if (block) then
-          if (any(abs(apart) > real(lattice%rows, wp) + round_off)) cycle
-        else if (norm2(apart) > lattice%reach + round_off) then
-          cycle
-        end if
+        if (block .and. any(abs(apart) > real(lattice%rows, wp) + round_off)) cycle
+        if (.not. block .and. norm2(apart) > lattice%reach + round_off) cycle
         call take(layer, corner, i, j, offset, places)
       end do
     end do

@@ -11,7 +11,7 @@ module pd_places
   implicit none
   private
 
-  public :: lattice_t, places_t, empty, new_places, volume_at, give_slivers
+  public :: lattice_t, places_t, empty, new_places, outer_lines, volume_at, give_slivers
 
   !> How shapes become points.
   type :: lattice_t
@@ -20,9 +20,12 @@ module pd_places
     logical  :: tributary                       !! each point has its own part of the area
     integer  :: rows                            !! thickness of fictitious layers in points
     real(wp) :: reach = 0.0_wp                  !! the horizon [spacings]
+    logical  :: in_runs = .false.               !! keep points in runs, if that is possible
+    logical  :: through_air = .true.            !! bonds cross what is not material
+    integer  :: strip = 2**18                   !! places that are looked at together, then
   end type lattice_t
 
-  !> Places in a box of columns and rows.
+  !> Places in a box of columns and rows: those of the whole region, or of a window of rows.
   type :: places_t
     type(shape_t), allocatable :: shapes(:)     !! the region
     integer, allocatable :: owner(:, :)         !! `empty`, or as body_t%boundary
@@ -47,23 +50,44 @@ module pd_places
 
 contains
 
-  !> The places of the region that shapes make.
-  subroutine new_places(shapes, lattice, places)
+  !> First and last row of places around the region that shapes make, and of its layers: these two
+  !> hold no point.
+  pure function outer_lines(shapes, lattice) result(lines)
+    type(shape_t),   intent(in) :: shapes(:)
+    type(lattice_t), intent(in) :: lattice
+    integer :: lines(2), squares(2, 2)
+
+    squares = squares_in(box_of(shapes))
+    lines = [squares(1, 2) - lattice%rows - 1, squares(2, 2) + lattice%rows + 2]
+  end function outer_lines
+
+  !> First and last column, first and last row of the squares that a box touches.
+  pure function squares_in(box) result(squares)
+    real(wp), intent(in) :: box(2, 2)
+    integer :: squares(2, 2)
+
+    squares(1, :) = floor(box(:, 1) + round_off)
+    squares(2, :) = ceiling(box(:, 2) - round_off) - 1
+  end function squares_in
+
+  !> The places of the region that shapes make, between two rows. What lies in squares at the edge
+  !> of such a window is not all known.
+  subroutine new_places(shapes, lattice, window, places)
     type(shape_t),   intent(in)  :: shapes(:)
     type(lattice_t), intent(in)  :: lattice
+    integer,         intent(in)  :: window(2)   !! first and last row, among `outer_lines`
     type(places_t),  intent(out) :: places
     integer  :: low(2), high(2)
     real(wp) :: offset
 
     places%shapes = shapes
     places%box = box_of(shapes)
-    places%squares(1, :) = floor(places%box(:, 1) + round_off)
-    places%squares(2, :) = ceiling(places%box(:, 2) - round_off) - 1
+    places%squares = squares_in(places%box)
     offset = merge(0.5_wp, 0.0_wp, lattice%cells)
     places%line([left, bottom]) = ceiling(places%box(:, 1) - offset - round_off)
     places%line([right, top]) = floor(places%box(:, 2) - offset + round_off)
-    low = places%squares(1, :) - lattice%rows - 1
-    high = places%squares(2, :) + lattice%rows + 2
+    low = [places%squares(1, 1) - lattice%rows - 1, window(1)]
+    high = [places%squares(2, 1) + lattice%rows + 2, window(2)]
     allocate (places%owner(low(1):high(1), low(2):high(2)), source=empty)
     allocate (places%part, mold=places%owner)
     allocate (places%filled(low(1):high(1), low(2):high(2)), source=.false._l1)
@@ -103,9 +127,9 @@ contains
     real(wp) :: corner(2)
     integer  :: j, low(2), high(2)
 
-    low = 2 * places%squares(1, :)
-    high = 2 * places%squares(2, :) + 1
-    corner = real(places%squares(1, :), wp)
+    low = 2 * [places%squares(1, 1), max(places%squares(1, 2), lbound(places%owner, 2))]
+    high = 2 * [places%squares(2, 1), min(places%squares(2, 2), ubound(places%owner, 2))] + 1
+    corner = 0.5_wp * real(low, wp)
     allocate (places%half(low(1):high(1), low(2):high(2)))
     allocate (marked(high(1) - low(1) + 1, high(2) - low(2) + 1), source=.false._l1)
     allocate (line(size(marked, 1), 1))
@@ -124,7 +148,8 @@ contains
     type(places_t),  intent(inout) :: places
     integer :: i, j
 
-    do j = places%squares(1, 2), places%squares(2, 2)
+    do j = max(places%squares(1, 2), lbound(places%owner, 2)), &
+      min(places%squares(2, 2), ubound(places%owner, 2))
       do i = places%squares(1, 1), places%squares(2, 1)
         if (lattice%cells) then
           places%filled(i, j) = places%owner(i, j) == 0
@@ -184,7 +209,8 @@ contains
   end function volume_at
 
   !> Give what lies in cells without a point to the nearest point of the body, of several the one
-  !> with the lowest number.
+  !> with the lowest number. The places must be those of the whole region, or of one without such
+  !> cells.
   subroutine give_slivers(places, lattice, volume)
     type(places_t),  intent(in)    :: places
     type(lattice_t), intent(in)    :: lattice
@@ -194,7 +220,8 @@ contains
     integer  :: ends(2, lbound(places%owner, 2):ubound(places%owner, 2))
 
     ends = rows_of_points(places)
-    do j = places%squares(1, 2), places%squares(2, 2) + 1
+    do j = max(places%squares(1, 2), lbound(places%owner, 2)), &
+      min(places%squares(2, 2) + 1, ubound(places%owner, 2))
       do i = places%squares(1, 1), places%squares(2, 1) + 1
         if (places%owner(i, j) /= empty) cycle
         if (lattice%cells) then

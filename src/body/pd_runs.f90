@@ -120,17 +120,17 @@ contains
     place = self%place(:, run) + [point - self%first(run), 0]
   end function place_of
 
-  !> The points of a boundary, in their order.
-  pure function points_of(self, boundary) result(points)
+  !> The points of some boundaries, in their order.
+  pure function points_of(self, boundaries) result(points)
     class(runs_t), intent(in) :: self
-    integer,       intent(in) :: boundary
+    integer,       intent(in) :: boundaries(2)   !! first and last
     integer, allocatable :: points(:)
     integer :: i, k, n, pass
 
     do pass = 1, 2   ! count, then fill
       n = 0
       do k = 1, self%count
-        if (self%boundary(k) /= boundary) cycle
+        if (self%boundary(k) < boundaries(1) .or. self%boundary(k) > boundaries(2)) cycle
         associate (a => self%first(k), b => self%first(k + 1) - 1)
           if (pass == 2) points(n + 1:n + b - a + 1) = [(i, i=a, b)]
           n = n + b - a + 1

@@ -13,12 +13,12 @@
 !> the second. A bond is cut where its points lie at different sides and its line meets the cut.
 !> Source: doc/theory.md, section 1.
 module pd_sight
-  use pd_geometry, only: body_t
+  use pd_body, only: body_t
   use pd_kinds, only: l1, wp
   implicit none
   private
 
-  public :: sight_t, new_sight
+  public :: sight_t, new_sight, sees_all
 
   !> Needed at set-up only.
   type :: sight_t
@@ -69,6 +69,38 @@ contains
       end do
     end associate
   end function new_sight
+
+  !> Whether all points of a strip see what is as near to them as the horizon, and not in a row
+  !> before them. Whether places exactly at the horizon are among them is not looked at closely.
+  logical function sees_all(body, number, rows, cells, reach)
+    type(body_t), intent(in) :: body             !! points of the strip, and around it
+    integer,      intent(in) :: number(:, :)     !! of the points, at places as in body%filled
+    integer,      intent(in) :: rows(2)          !! of the strip
+    logical,      intent(in) :: cells            !! points stand in the middle of squares
+    real(wp),     intent(in) :: reach            !! horizon [spacings]
+    real(wp), parameter :: a_little_wider = 1.0_wp + 1.0e-4_wp
+    type(sight_t) :: sight
+    real(wp) :: cuts(4, 0)
+    integer :: i, j, x, y, here(2), last(2)
+
+    sees_all = .true.
+    sight = new_sight(body, cells, body%grid%spacing, reach * body%grid%spacing, &
+      cuts)
+    last = shape(number)
+    do i = 1, body%n
+      if (body%place(i, 2) < rows(1) .or. body%place(i, 2) > rows(2)) cycle
+      if (sight%all_clear(i)) cycle
+      here = body%place(i, :) - lbound(body%filled) + 1
+      do y = 0, min(sight%reach, last(2) - here(2))
+        do x = max(1 - here(1), merge(1, -sight%reach, y == 0)), min(sight%reach, last(1) - here(1))
+          if (norm2(real([x, y], wp)) > reach * a_little_wider) cycle
+          j = number(here(1) + x, here(2) + y)
+          if (j > 0) sees_all = sees_all .and. sight%through_material(i, j)
+        end do
+      end do
+      if (.not. sees_all) return
+    end do
+  end function sees_all
 
   !> Empty squares in a box of columns and rows; one at least where the box goes beyond the lattice.
   pure integer function empty_squares(self, low, high) result(found)

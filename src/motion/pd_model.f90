@@ -1,7 +1,7 @@
 !> The model: everything about a run that does not change while it runs.
 module pd_model
   use pd_blocks, only: blocks_t
-  use pd_geometry, only: body_t
+  use pd_body, only: body_t
   use pd_kinds, only: wp
   use pd_loads, only: loads_t
   use pd_materials, only: materials_t
@@ -70,7 +70,7 @@ contains
   subroutine release_set_up(model)
     type(model_t), intent(inout) :: model
 
-    if (allocated(model%body%position)) call release_points(model%body)
+    call release_points(model%body)
     if (allocated(model%initial)) deallocate (model%initial)
   end subroutine release_set_up
 
@@ -78,9 +78,8 @@ contains
   subroutine release_points(body)
     type(body_t), intent(inout) :: body
 
-    deallocate (body%position, body%volume, body%part)
-    if (allocated(body%place)) deallocate (body%place)
-    if (allocated(body%filled)) deallocate (body%filled)
+    if (body%on_lattice()) call body%keep_in_runs()
+    if (allocated(body%position)) deallocate (body%position, body%volume, body%part)
   end subroutine release_points
 
   !> Height of the top of the body before any stage has dug into it [m].

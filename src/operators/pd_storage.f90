@@ -32,6 +32,9 @@ module pd_storage
     procedure, private :: spread_tensors
     procedure, private :: spread_numbers
     generic :: spread => spread_values, spread_tensors, spread_numbers
+    procedure, private :: new_field_of_values
+    procedure, private :: new_field_of_tensors
+    generic :: new_field => new_field_of_values, new_field_of_tensors
     procedure, private :: row_of_point
     procedure, private :: all_rows
     generic :: row => row_of_point, all_rows
@@ -233,6 +236,24 @@ contains
     class(storage_t), intent(in) :: self
     real(wp),         intent(in) :: values(:)   !! of all points, or of self%points
     real(wp), allocatable :: field(:)           !! (rows)
+
+    call self%new_field(values, field)
+  end function spread_values
+
+  !> A field with components.
+  function spread_tensors(self, values) result(field)
+    class(storage_t), intent(in) :: self
+    real(wp),         intent(in) :: values(:, :)   !! (points, components)
+    real(wp), allocatable :: field(:, :)           !! (rows, components)
+
+    call self%new_field(values, field)
+  end function spread_tensors
+
+  !> The same without a copy: an assignment would take memory for the rows of all ranks.
+  subroutine new_field_of_values(self, values, field)
+    class(storage_t), intent(in) :: self
+    real(wp),         intent(in) :: values(:)   !! of all points, or of self%points
+    real(wp), allocatable, intent(out) :: field(:)   !! (rows)
     integer :: i, shift
 
     allocate (field(self%rows))
@@ -243,13 +264,13 @@ contains
         field(rows(i - a + 1)) = values(i - shift)
       end do
     end associate
-  end function spread_values
+  end subroutine new_field_of_values
 
-  !> A field with components.
-  function spread_tensors(self, values) result(field)
+  !> The same of a field with components.
+  subroutine new_field_of_tensors(self, values, field)
     class(storage_t), intent(in) :: self
     real(wp),         intent(in) :: values(:, :)   !! (points, components)
-    real(wp), allocatable :: field(:, :)           !! (rows, components)
+    real(wp), allocatable, intent(out) :: field(:, :)   !! (rows, components)
     integer :: c, i, shift
 
     allocate (field(self%rows, size(values, 2)))
@@ -262,7 +283,7 @@ contains
         end do
       end do
     end associate
-  end function spread_tensors
+  end subroutine new_field_of_tensors
 
   !> A field of whole numbers; rows without a point have the number of the last point before them,
   !> or of the first one.

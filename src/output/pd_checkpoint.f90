@@ -5,6 +5,7 @@
 !> The checksum of all bytes is checked before HDF5 opens the file (`pd_checkpoint_seal`).
 module pd_checkpoint
   use pd_blocks, only: blocks_t
+  use pd_body, only: body_t
   use pd_checkpoint_seal, only: found_head, head, head_length, is_whole, schema
   use pd_clock, only: clock_t
   use pd_errors, only: error_list_t
@@ -13,7 +14,7 @@ module pd_checkpoint
   use pd_hdf5, only: close_file, create_file, create_group, hdf5_file_t, open_file, &
     read_attribute, read_dataset, write_attribute, write_dataset
   use pd_kinds, only: i8, wp
-  use pd_parts, only: as_column, write_in_parts
+  use pd_parts, only: as_column, write_boundaries, write_in_parts
   use pd_points, only: points_t
   use pd_state, only: state_t
   use pd_step_limit, only: step_limit_t
@@ -100,7 +101,7 @@ contains
   !> hand in.
   !>
   !> Errors: it cannot be written; the checkpoints so far are then as they were.
-  subroutine write_checkpoint(stem, checkpoint, state, storage, errors, blocks, points)
+  subroutine write_checkpoint(stem, checkpoint, state, storage, errors, blocks, points, body)
     character(*),       intent(in)    :: stem   !! output folder and name of the run
     type(checkpoint_t), intent(in)    :: checkpoint
     class(state_t),     intent(inout) :: state   !! visited, not changed
@@ -108,6 +109,7 @@ contains
     type(error_list_t), intent(inout) :: errors
     type(blocks_t), optional, intent(in) :: blocks   !! of this rank; absent: all
     type(points_t), optional, intent(in) :: points   !! absent: they are in the checkpoint
+    type(body_t),   optional, intent(in) :: body     !! likewise
     character(:), allocatable :: temporary
     type(writing_t) :: writer
     integer :: before
@@ -123,7 +125,7 @@ contains
       call create_group(writer%file, '/state', errors)
     end if
     writer%errors = errors
-    if (present(points)) call write_points(writer, points)
+    if (present(points) .and. present(body)) call write_points(writer, points, body)
     call state%visit(writer)
     if (writer%blocks%ranks%mine > 0) return
     errors = writer%errors
@@ -198,20 +200,23 @@ contains
     if (allocated(checkpoint%position)) then
       call write_dataset(file, '/position', checkpoint%position, errors)
       call write_dataset(file, '/volume', checkpoint%volume, errors)
+      call write_dataset(file, '/boundary', checkpoint%boundary, errors)
     end if
-    call write_dataset(file, '/boundary', checkpoint%boundary, errors)
     call write_dataset(file, '/changes', checkpoint%changes, errors)
   end subroutine write_numbers
 
-  !> Positions and volumes of points of which each rank knows its own.
-  subroutine write_points(self, points)
+  !> Positions and volumes of points of which each rank knows its own, and their boundaries.
+  subroutine write_points(self, points, body)
     class(writing_t), intent(inout) :: self
     type(points_t),   intent(in)    :: points
+    type(body_t),     intent(in)    :: body
 
     call write_in_parts(self%file, '/position', self%blocks, self%storage, points%position, &
       self%errors)
     call write_in_parts(self%file, '/volume', self%blocks, self%storage, as_column(points%volume), &
       self%errors)
+    if (self%blocks%ranks%mine == 0) &
+      call write_boundaries(self%file, '/boundary', body, self%errors)
   end subroutine write_points
 
   subroutine write_1(self, about, values)

@@ -1,8 +1,8 @@
 !> Whether a checkpoint fits the model that is to go on from it.
 module pd_checkpoint_fit
+  use pd_body, only: body_t
   use pd_checkpoint, only: checkpoint_t
   use pd_errors, only: error_list_t
-  use pd_geometry, only: body_t
   use pd_kinds, only: wp
   use pd_model, only: model_t
   use pd_state, only: state_t
@@ -58,9 +58,12 @@ contains
       type(body_t), intent(in) :: body
 
       are_those_of = size(checkpoint%volume) == body%n
-      if (are_those_of) are_those_of = all(abs(checkpoint%position - body%position) <= 0.0_wp) &
-        .and. all(abs(checkpoint%volume - body%volume) <= 0.0_wp) &
-        .and. all(checkpoint%boundary == body%boundary)
+      if (.not. are_those_of) return
+      associate (ends => [1, body%n])
+        are_those_of = all(abs(checkpoint%position - body%positions(ends)) <= 0.0_wp) &
+          .and. all(abs(checkpoint%volume - body%volumes(ends)) <= 0.0_wp) &
+          .and. all(checkpoint%boundary == body%boundaries(ends))
+      end associate
     end function are_those_of
 
   end function same_points

@@ -4,15 +4,19 @@
 !> Every rank must come to these calls, also where the file is not good.
 module pd_parts
   use pd_blocks, only: blocks_t
+  use pd_body, only: body_t
   use pd_errors, only: error_list_t
   use pd_gather, only: points_of_rank
-  use pd_hdf5, only: hdf5_file_t, overwrite_some_rows, reserve_dataset
+  use pd_hdf5, only: hdf5_file_t, overwrite_part, overwrite_some_rows, reserve_dataset, &
+    reserve_whole_numbers
   use pd_kinds, only: wp
   use pd_storage, only: storage_t
   implicit none
   private
 
-  public :: put_parts, put_field, write_in_parts, reserve_values, as_column
+  public :: put_parts, put_field, write_in_parts, write_boundaries, reserve_values, as_column
+
+  integer, parameter :: most = 2**15   ! points at a time
 
 contains
 
@@ -24,7 +28,6 @@ contains
     type(storage_t),    intent(in)    :: storage         !! rows of the points
     real(wp),           intent(in)    :: values(:, :)    !! (components,points)
     type(error_list_t), intent(inout) :: errors
-    integer, parameter :: most = 2**15   ! points at a time
     real(wp), allocatable :: part(:, :)
     integer :: ends(2), first, k, last
 
@@ -74,6 +77,21 @@ contains
       call reserve_values(file, name, [storage%n, size(field, 2)], errors)
     call put_field(file, name, blocks, storage, field, errors)
   end subroutine write_in_parts
+
+  !> Write the boundaries of all points, which every rank knows, into a new dataset.
+  subroutine write_boundaries(file, name, body, errors)
+    type(hdf5_file_t),  intent(inout) :: file
+    character(*),       intent(in)    :: name
+    type(body_t),       intent(in)    :: body
+    type(error_list_t), intent(inout) :: errors
+    integer :: first, last
+
+    call reserve_whole_numbers(file, name, [body%n], errors)
+    do first = 1, body%n, most
+      last = min(body%n, first + most - 1)
+      call overwrite_part(file, name, first, real(body%boundaries([first, last]), wp), errors)
+    end do
+  end subroutine write_boundaries
 
   !> A dataset for the values of points; with one component of rank 1.
   subroutine reserve_values(file, name, numbers, errors)

@@ -11,7 +11,6 @@ module pd_record
   use pd_errors, only: error_list_t
   use pd_files, only: prepare_folder
   use pd_frame_fields, only: frame_fields
-  use pd_geometry, only: body_t
   use pd_history, only: close_history, create_history, history_t, read_history, resume_history, &
     write_row
   use pd_history_columns, only: history_columns
@@ -156,9 +155,10 @@ contains
       description%upper = model%whole%upper
     end if
     description%steps = schedule%steps
+    description%n = model%shown%n
     description%in_parts = model%blocks%ranks%count > 1 .and. model%whole%n == 0
     if (description%in_parts) then
-      description%boundary = model%body%boundary
+      description%body = model%body
     else
       call points_of(model, description%position, description%volume, description%boundary)
     end if
@@ -195,7 +195,7 @@ contains
     else
       position = model%points%position(model%shown%row(), :)
       volume = model%points%volume(model%shown%row())
-      boundary = model%body%boundary
+      boundary = model%body%boundaries([1, model%body%n])
     end if
   end subroutine points_of
 

@@ -92,9 +92,8 @@ contains
     allocate (checkpoint%changes(n_change, max(1, size(model%supports%items))), source=-1.0_wp)
     checkpoint%changes(:, :size(model%supports%items)) = changes_of(model%supports)
     if (model%blocks%ranks%count > 1 .and. model%whole%n == 0) then
-      checkpoint%boundary = model%body%boundary
       call write_checkpoint(record%stem, checkpoint, state, model%shown, errors, model%blocks, &
-        model%points)
+        model%points, model%body)
     else
       call points_of(model, checkpoint%position, checkpoint%volume, checkpoint%boundary)
       call write_checkpoint(record%stem, checkpoint, state, model%shown, errors, model%blocks)

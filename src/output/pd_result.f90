@@ -361,7 +361,7 @@ contains
     type(places_t),          intent(in)    :: places
 
     result%path = stem//'.h5'
-    result%n = size(description%boundary)
+    result%n = description%n
     result%places = places
     result%fields = description%fields
     result%columns = description%columns

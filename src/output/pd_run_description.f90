@@ -1,5 +1,6 @@
 !> What a result file says about a run apart from frames and rows: provenance, input, points.
 module pd_run_description
+  use pd_body, only: body_t
   use pd_errors, only: error_list_t
   use pd_frame_fields, only: frame_field_t
   use pd_frames, only: write_label
@@ -8,7 +9,7 @@ module pd_run_description
   use pd_kinds, only: wp
   use pd_labels, only: label_t
   use pd_observe, only: column_t
-  use pd_parts, only: reserve_values
+  use pd_parts, only: reserve_values, write_boundaries
   use pd_system, only: host_name, process_number
   use pd_text, only: integer_text
   use pd_trust, only: reserve_trust
@@ -38,8 +39,11 @@ module pd_run_description
     real(wp) :: lower(2) = 0.0_wp, upper(2) = 0.0_wp               !! extents of the body [m]
     real(wp) :: time_step = 0.0_wp                                 !! [s]
     integer  :: steps = 0                                          !! of the whole run
-    logical :: in_parts = .false.              !! positions, volumes and yield stresses come
-                                               !! later, from every rank (`hand_in_points`)
+    integer :: n = 0                           !! points
+    type(body_t) :: body                       !! where each rank has a part of the points: what
+                                               !! all know of them; positions, volumes and yield
+                                               !! stresses come later (`hand_in_points`)
+    logical :: in_parts = .false.              !! it is so
     real(wp), allocatable :: position(:, :)    !! (n,2) [m]
     real(wp), allocatable :: volume(:)         !! (n) [m^2]
     integer,  allocatable :: boundary(:)       !! (n) 0: body, k: boundary k
@@ -131,8 +135,8 @@ contains
 
     call create_group(file, '/points', errors)
     if (description%in_parts) then
-      call reserve_values(file, '/points/position', [size(description%boundary), 2], errors)
-      call reserve_values(file, '/points/volume', [size(description%boundary), 1], errors)
+      call reserve_values(file, '/points/position', [description%n, 2], errors)
+      call reserve_values(file, '/points/volume', [description%n, 1], errors)
     else
       call write_dataset(file, '/points/position', description%position, errors)
       call write_dataset(file, '/points/volume', description%volume, errors)
@@ -141,14 +145,18 @@ contains
     call write_attribute(file, '/points/position', 'components', 'x y', errors)
     call write_label(file, '/points/volume', label_t('', 'm^2', &
       'volume of a point per unit of thickness'), errors)
-    call write_dataset(file, '/points/boundary', description%boundary, errors)
+    if (description%in_parts) then
+      call write_boundaries(file, '/points/boundary', description%body, errors)
+    else
+      call write_dataset(file, '/points/boundary', description%boundary, errors)
+    end if
     call write_label(file, '/points/boundary', label_t('', '1', &
       'boundary that a fictitious point belongs to, counted from 1; 0: a point of the body'), &
       errors)
     call write_numbers(file, size(description%boundary), errors)
     if (allocated(description%yield_stress)) then
       if (description%in_parts) then
-        call reserve_values(file, '/points/yield_stress', [size(description%boundary), 1], errors)
+        call reserve_values(file, '/points/yield_stress', [description%n, 1], errors)
       else
         call write_dataset(file, '/points/yield_stress', description%yield_stress, errors)
       end if

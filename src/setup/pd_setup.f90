@@ -6,13 +6,11 @@ module pd_setup
   use pd_bond_list, only: bond_list_t, new_bond_list
   use pd_errors, only: error_list_t
   use pd_families, only: horizon_t, new_horizon
-  use pd_input_shapes, only: is_bearing
   use pd_input_types, only: input_t
-  use pd_kinds, only: is_set, wp
+  use pd_kinds, only: wp
   use pd_lattice, only: lattice_operators_t, new_lattice_operators
   use pd_model, only: model_t
   use pd_ranks, only: ranks_t
-  use pd_runs, only: runs_of
   use pd_setup_gradients, only: check_gradients
   use pd_setup_gravity, only: set_up_gravity
   use pd_setup_initial_stress, only: set_up_initial_stress
@@ -28,7 +26,7 @@ module pd_setup
   implicit none
   private
 
-  public :: set_up_model, looks_near
+  public :: set_up_model
 
 contains
 
@@ -40,8 +38,8 @@ contains
   !> leaves nothing of a material, a probe far from the body, an initial stress beyond the yield
   !> stress.
   !>
-  !> `ranks`: each has its own part of a lattice from the start, unless something looks farther than
-  !> a horizon and the supports. Errors may be those of one rank only.
+  !> `ranks`: each has its own part of a lattice from the start if the points are in runs. Errors
+  !> may be those of one rank only.
   subroutine set_up_model(input, model, errors, stage, ranks)
     type(input_t),      intent(in)    :: input
     type(model_t),      intent(inout) :: model    !! in: with its body
@@ -64,7 +62,7 @@ contains
     if (errors%count() > 0) return
     rows = ceiling(model%delta / model%spacing - 1.0e-6_wp)
     if (present(ranks)) then
-      if (looks_near(input, model)) parts = ranks
+      if (model%body%runs%n > 0) parts = ranks
     end if
     call choose_operators(horizon, input%run%operators, sight, parts, model, errors)
     if (errors%count() > 0) return
@@ -75,7 +73,7 @@ contains
     call set_up_points(model)
     call invert_shape_tensors(model%operators, model%points%position, model%points%volume, errors)
     if (any_rank(model%blocks%ranks, errors%count() > 0)) return
-    if (.not. allocated(model%body%place)) call balance_cloud(input, model)
+    if (.not. model%body%on_lattice()) call balance_cloud(input, model)
     call set_up_materials(input, present_stage, model)
     call check_gradients(input, model, errors)
     if (input%stabilisation%method == 'relaxing') &
@@ -93,26 +91,6 @@ contains
       call set_up_initial_stress(input, horizon, model, errors)
   end subroutine set_up_model
 
-  !> Whether nothing in a model looks farther than a horizon, but for supports and probes: neither
-  !> stages, mirrors, loads, initial stress, nor statistics of what varies over the body.
-  pure logical function looks_near(input, model)
-    type(input_t), intent(in) :: input
-    type(model_t), intent(in) :: model
-    integer :: k
-
-    looks_near = model%whole%n == 0 .and. size(input%pressures) == 0 &
-      .and. size(input%gravity%acceleration) == 0 .and. .not. is_set(input%initial_stress%k0) &
-      .and. .not. is_set(input%random_field%coefficient_of_variation)
-    do k = 1, size(input%boundaries)
-      looks_near = looks_near .and. .not. is_bearing(input%boundaries(k))
-    end do
-    do k = 1, size(input%materials)
-      looks_near = looks_near &
-        .and. .not. abs(input%materials(k)%youngs_modulus_gradient) > 0.0_wp &
-        .and. .not. abs(input%materials(k)%yield_stress_gradient) > 0.0_wp
-    end do
-  end function looks_near
-
   !> Lattice operators for a body on a lattice, unless a list is asked for; otherwise the bond list.
   subroutine choose_operators(horizon, form, sight, ranks, model, errors)
     type(horizon_t),    intent(in)    :: horizon
@@ -124,10 +102,10 @@ contains
     type(lattice_operators_t), allocatable :: lattice
     type(bond_list_t),         allocatable :: list
 
-    if (allocated(model%body%place) .and. form /= 'list') then
+    if (model%body%on_lattice() .and. form /= 'list') then
       allocate (lattice)
-      call new_lattice_operators(horizon, model%spacing, runs_of(model%body%place, &
-        model%body%volume), lattice, sight, model%body%box, ranks)
+      call new_lattice_operators(horizon, model%spacing, model%body%in_runs(), &
+        lattice, sight, model%body%box, ranks)
       call move_alloc(lattice, model%operators)
     else
       allocate (list)

@@ -10,6 +10,7 @@ module pd_setup_body
   use pd_kinds, only: is_set, wp
   use pd_random_field, only: longest_way
   use pd_setup_mirror, only: give_images_their_volume
+  use pd_setup_reach, only: looks_near
   use pd_text, only: coordinate_text, number_text, short_number
   implicit none
   private
@@ -93,24 +94,30 @@ contains
     type(input_t),      intent(in)    :: input
     type(body_t),       intent(in)    :: body
     type(error_list_t), intent(inout) :: errors
-    logical :: counts(body%n), in_patch(body%n)
+    logical :: counts(0:size(input%bodies)), found
     integer :: i
 
-    counts = body%boundary == 0
-    if (any_yields(input)) then
+    counts(0) = .false.   ! layers
+    do i = 1, size(input%bodies)
+      counts(i) = .not. any_yields(input) .or. yields(input, input%bodies(i)%material)
+    end do
+    found = .false.
+    if (is_set(input%random_field%coefficient_of_variation)) then
       do i = 1, body%n
-        counts(i) = counts(i) .and. yields(input, input%bodies(body%part(i))%material)
+        found = found .or. counts(merge(body%part_of(i), 0, body%boundary_of(i) == 0))
       end do
+      if (.not. found) &
+        call errors%add('the random field touches no point that can yield', '&random_field')
     end if
-    if (is_set(input%random_field%coefficient_of_variation) .and. .not. any(counts)) &
-      call errors%add('the random field touches no point that can yield', '&random_field')
     associate (flaw => input%imperfection)
       if (.not. flaw%amplitude > 0.0_wp) return
+      found = .false.
       do i = 1, body%n
-        in_patch(i) = norm2(body%position(i, :) - [flaw%x, flaw%y]) &
-          <= flaw%radius * (1.0_wp + 1.0e-6_wp)
+        if (norm2(body%position_of(i) - [flaw%x, flaw%y]) > flaw%radius * (1.0_wp + 1.0e-6_wp)) &
+          cycle
+        found = found .or. counts(merge(body%part_of(i), 0, body%boundary_of(i) == 0))
       end do
-      if (.not. any(in_patch .and. counts)) call errors%add( &
+      if (.not. found) call errors%add( &
         'the weak patch holds no point of the body that can yield', '&imperfection', &
         short_number(flaw%radius)//' m about '//number_text(flaw%x)//', '//number_text(flaw%y), &
         'a patch in the body, wider than the spacing')
@@ -160,6 +167,8 @@ contains
       lattice%tributary = d%volumes == 'tributary'
       lattice%reach = d%horizon / d%spacing
       lattice%rows = ceiling(lattice%reach - 1.0e-6_wp)
+      lattice%in_runs = looks_near(input)
+      lattice%through_air = d%families == 'distance'
     end associate
     call find_extents(input%bodies(:1), lattice%spacing, origin, upper, known)
     adjusted = .false.

@@ -4,6 +4,7 @@
 !> the body.
 module pd_setup_loads
   use pd_affine_support, only: new_affine_support
+  use pd_body, only: body_t
   use pd_errors, only: error_list_t
   use pd_input_shapes, only: body_number, is_bearing
   use pd_input_types, only: boundary_input_t, input_t, pressure_input_t
@@ -13,7 +14,7 @@ module pd_setup_loads
   use pd_model, only: model_t
   use pd_pages, only: clear_rows
   use pd_platens, only: new_platens
-  use pd_point_sets, only: boundary_set, point_set_t, side_t
+  use pd_point_sets, only: point_set_t, side_t
   use pd_pressure, only: new_pressure, pressure_t, spread_on_edges, spread_on_side, surface_t
   use pd_rigid_support, only: new_rigid_support
   use pd_setup_surface, only: edges_of, find_surface, taken
@@ -39,16 +40,18 @@ contains
     type(model_t),      intent(inout) :: model
     type(error_list_t), intent(inout) :: errors
     real(wp), allocatable :: density(:), mass(:)
+    integer,  allocatable :: beside(:)
     integer :: i, k, n
 
     n = size(model%points%volume)
     allocate (density(n), mass(n))
     call clear_rows(density, [1, 0])
     call clear_rows(mass, [1, 0])
-    do i = 1, model%body%n   ! of the points of boundaries, on every rank
-      if (model%body%boundary(i) == 0) cycle
-      associate (row => model%operators%storage%row(i))
-        density(row) = model%materials%list(stage%material_of(model%body%part(i)))%density
+    allocate (beside, source=model%body%points_beside())   ! on every rank
+    do i = 1, size(beside)
+      associate (row => model%operators%storage%row(beside(i)), &
+        part => model%body%part_of(beside(i)))
+        density(row) = model%materials%list(stage%material_of(part))%density
         if (model%at_equilibrium) cycle   ! nothing has kinetic energy
         mass(row) = density(row) * model%points%volume(row)
       end associate
@@ -90,8 +93,8 @@ contains
     type(loaded_platen_t) :: platen
 
     associate (b => given(k), body => model%body)
-      set = boundary_set(b%name, body%boundary, k)
-      set%points = model%operators%storage%row(set%points)
+      set%name = b%name
+      set%points = model%operators%storage%row(body%points_of(k))
       motion(1) = new_table(b%times, b%velocities_x, b%velocity(1))
       motion(2) = new_table(b%times, b%velocities_y, b%velocity(2))
       motion(3) = new_table(b%times, b%factors, 1.0_wp)
@@ -101,7 +104,7 @@ contains
           model%points%position, mass))
       else if (size(b%traction) > 0 .and. size(set%points) > 0) then
         platen = new_loaded_platen(set, taken(b), b%traction, &
-          loaded_lengths(given, body%sides(side_number(b%side)), body%boundary), b%ramp_time, &
+          loaded_lengths(given, body%sides(side_number(b%side)), body), b%ramp_time, &
           since)
         if (is_set(b%traction_until)) then
           platen%next = new_rigid_support(set, taken(b), motion(:2), mass)
@@ -118,18 +121,18 @@ contains
 
   !> Length of a side that carries x and y of a traction [m]: of the body, and of the layers at its
   !> ends where they slide along it and so stand for a body that goes on.
-  pure function loaded_lengths(given, side, owner) result(length)
+  pure function loaded_lengths(given, side, body) result(length)
     type(boundary_input_t), intent(in) :: given(:)
     type(side_t),           intent(in) :: side
-    integer,                intent(in) :: owner(:)   !! boundary of every point
+    type(body_t),           intent(in) :: body
     real(wp) :: length(2), ends(2)
     integer  :: c, last
 
     last = size(side%points)
     do c = 1, 2
       ends = [side%lower, side%upper]
-      if (slides(owner(side%points(1)))) ends(1) = side%from(1)
-      if (slides(owner(side%points(last)))) ends(2) = side%to(last)
+      if (slides(body%boundary_of(side%points(1)))) ends(1) = side%from(1)
+      if (slides(body%boundary_of(side%points(last)))) ends(2) = side%to(last)
       length(c) = sum(max(0.0_wp, min(side%to, ends(2)) - max(side%from, ends(1))))
     end do
 

@@ -34,29 +34,32 @@ contains
   !> What does not change at the points.
   subroutine set_up_points(model)
     type(model_t), intent(inout) :: model
-
+    integer, allocatable :: beside(:), boundary(:), rows(:)
     integer :: i
 
     associate (points => model%points, body => model%body, storage => model%operators%storage)
-      points%position = storage%spread(body%position)
+      call storage%new_field(body%positions(storage%points), points%position)
       if (model%whole%n > 0) points%position = model%shown%spread(model%whole%position)
-      points%volume = storage%spread(body%volume)
+      call storage%new_field(body%volumes(storage%points), points%volume)
       allocate (points%in_body(storage%rows), points%place(storage%rows))
       allocate (points%free(storage%rows, 2))
       call clear_rows(points%in_body, storage%kept)
       call clear_rows(points%place, storage%kept)
       call clear_rows(points%free, storage%kept)
-      do i = storage%points(1), storage%points(2)
-        if (body%boundary(i) == 0) points%in_body(storage%row(i)) = 1.0_wp
-        points%free(storage%row(i), :) = 1.0_wp
+      rows = storage%rows_of(storage%points)
+      boundary = body%boundaries(storage%points)
+      do i = 1, size(rows)
+        if (boundary(i) == 0) points%in_body(rows(i)) = 1.0_wp
+        points%free(rows(i), :) = 1.0_wp
       end do
-      do i = 1, body%n   ! supports look at theirs, on every rank
-        if (body%boundary(i) == 0) cycle
-        points%position(storage%row(i), :) = body%position(i, :)
-        points%volume(storage%row(i)) = body%volume(i)
+      beside = body%points_beside()
+      do i = 1, size(beside)   ! supports look at theirs, on every rank
+        associate (row => storage%row(beside(i)))
+          points%position(row, :) = body%position_of(beside(i))
+          points%volume(row) = body%volume_of(beside(i))
+        end associate
       end do
-      points%all_volume = sum(body%volume)
-      points%largest_volume = maxval(body%volume)
+      call body%add_up(points%all_volume, points%largest_volume)
     end associate
   end subroutine set_up_points
 
@@ -80,8 +83,8 @@ contains
         allocate (material%law, source=new_law(given))
       end associate
     end do
-    associate (a => model%operators%storage%points(1), b => model%operators%storage%points(2))
-      material_of = stage%material_of(model%body%part(a:b))
+    associate (ends => model%operators%storage%points)
+      material_of = stage%material_of(model%body%parts(ends))
       law_of = material_of
       call set_up_bearings(input, law_of, model)
       call divide_into_runs(model%blocks, model%operators%storage%spread(law_of), model%materials)
@@ -89,8 +92,8 @@ contains
       call note_used(model)
       call set_up_stiffness(input, material_of, model)
       allocate (strength(size(material_of)))
-      call set_up_strength(input, material_of, model%body%position(a:b, :), top_of(model), strength)
-      model%strength = model%operators%storage%spread(strength)
+      call set_up_strength(input, material_of, model%body%positions(ends), top_of(model), strength)
+      call model%operators%storage%new_field(strength, model%strength)
     end associate
     if (model%whole%n > 0) then
       allocate (model%shown_strength(model%whole%n))
@@ -212,7 +215,7 @@ contains
       turns = turns .or. .not. same_type_as(model%materials%list(k)%measure, small_strain_t())
     end do
     family = whole_family(horizon, merge(model%spacing, model%delta / fine, &
-      allocated(model%body%place)))
+      model%body%on_lattice()))
     if (family%weight <= 0.0_wp) then
       call errors%add('the relaxing control needs bonds of different lengths', &
         where='&stabilisation, key method', found='one length in every family', &

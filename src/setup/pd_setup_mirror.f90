@@ -2,8 +2,8 @@
 !>
 !> Source: doc/theory.md, section 7.
 module pd_setup_mirror
+  use pd_body, only: body_t
   use pd_errors, only: error_list_t
-  use pd_geometry, only: body_t
   use pd_input_shapes, only: is_bearing
   use pd_input_types, only: input_t
   use pd_kinds, only: wp

@@ -1,9 +1,9 @@
 !> From checked input to which points see each other.
 module pd_setup_sight
+  use pd_body, only: body_t
   use pd_cells, only: cells_t, largest_neighbourhood, sort_into_cells
   use pd_errors, only: error_list_t
   use pd_families, only: family, horizon_t
-  use pd_geometry, only: body_t
   use pd_input_types, only: input_t
   use pd_kinds, only: wp
   use pd_sight, only: new_sight, sight_t
@@ -15,7 +15,8 @@ module pd_setup_sight
 
 contains
 
-  !> Sight of the points of a body; not allocated: all points within the horizon see each other.
+  !> Sight of the points of a body; not allocated: all points within the horizon see each other, as
+  !> those in runs do.
   !>
   !> Errors: a cut that no bond crosses.
   subroutine look_around(input, horizon, body, sight, errors)
@@ -27,7 +28,7 @@ contains
     real(wp) :: cuts(4, size(input%cuts))
     integer  :: k
 
-    if (input%discretisation%families == 'distance') return
+    if (input%discretisation%families == 'distance' .or. body%runs%n > 0) return
     if (size(input%cuts) == 0 .and. .not. allocated(body%place)) return
     do k = 1, size(input%cuts)
       cuts(:, k) = [input%cuts(k)%x(1), input%cuts(k)%y(1), input%cuts(k)%x(2), input%cuts(k)%y(2)]

@@ -4,9 +4,9 @@
 !> between them. All have the rows of the fields in common, so that a state goes on from one stage
 !> to the next.
 module pd_setup_stages
+  use pd_body, only: body_t
   use pd_doubt_list, only: doubts_t
   use pd_errors, only: error_list_t
-  use pd_geometry, only: body_t
   use pd_input_types, only: body_input_t, boundary_input_t, input_t
   use pd_kinds, only: wp
   use pd_setup_body, only: set_up_body

@@ -4,6 +4,7 @@ They run where `make MPI=1` has built bin/perigeo-mpi and mpirun is there. Ranks
 as they never should in a run that matters, so nothing is said of times.
 """
 
+import contextlib
 import os
 import re
 import shutil
@@ -281,6 +282,41 @@ def test_the_check_tells_what_ranks_would_have(start):
     assert fewest >= 0.5 * most
     halo = int(re.search(r"halo +(\d+) rows", told)[1])
     assert 0 < halo < points
+
+
+def peak_memory(process, ranks):
+    """Return the largest resident memory of each rank of a run, until it ends [kB]."""
+    peaks = {}
+    while process.poll() is None:
+        numbers = [process.pid]
+        if ranks:
+            with contextlib.suppress(OSError):
+                children = Path(f"/proc/{process.pid}/task/{process.pid}/children")
+                numbers = [int(word) for word in children.read_text().split()]
+        for number in numbers:
+            with contextlib.suppress(OSError):
+                told = Path(f"/proc/{number}/status").read_text()
+                if match := re.search(r"VmHWM:\s+(\d+) kB", told):
+                    peaks[number] = int(match[1])
+        time.sleep(0.01)
+    assert process.returncode == 0, process.stderr.read()
+    return sorted(peaks.values())[-max(1, ranks) :]
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="memory is read from /proc")
+def test_a_rank_has_memory_for_its_own_points_only(start):
+    brief = "final_strain = 8.0e-8, time_step_rule = 'fixed', time_step = 4.0e-6"
+    text = SPECIMEN.replace("final_strain = 0.01", brief).replace("0.004, 0.01", "8.0e-8")
+    fine = changed(text, spacing="0.00125", horizon="0.003125")  # 330 000 points
+    peaks = [
+        peak_memory(start(case, f"{name}{ranks}", ranks), ranks)
+        for name, case in (("small", text), ("fine", fine))
+        for ranks in (0, 4)
+    ]
+    small, small_ranks, serial, ranks = (max(peak) for peak in peaks)
+    assert len(peaks[3]) == 4
+    # a quarter and the halo, beside what a run needs that has hardly any points
+    assert ranks - small_ranks < 0.33 * (serial - small), peaks
 
 
 # ------------------------------------------------------------------------------- errors

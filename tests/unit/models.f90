@@ -1,5 +1,6 @@
 !> Models from the texts of input files, for the suites of what reads and translates them.
 module models
+  use pd_body, only: body_t
   use pd_clock, only: clock_t
   use pd_doubt_list, only: doubts_t
   use pd_errors, only: error_list_t
@@ -59,9 +60,27 @@ contains
     call set_up_body(made%input, made%model%body, made%doubts, made%errors, made%errors)
     if (made%errors%count() > 0) return
     call set_up_model(made%input, made%model, made%errors)
+    if (made%model%body%runs%n > 0) call take_apart(made%model%body)
     if (made%errors%count() > 0) return
     call set_up_schedule(made%input, made%clock, made%model, made%schedule, made%errors)
   end function made_of
+
+  !> Give the points of a body in runs a number each, for suites to look at.
+  subroutine take_apart(points)
+    type(body_t), intent(inout) :: points
+    integer :: i
+
+    associate (ends => [1, points%n])
+      points%position = points%positions(ends)
+      points%volume = points%volumes(ends)
+      points%part = points%parts(ends)
+      points%boundary = points%boundaries(ends)
+    end associate
+    allocate (points%place(points%n, 2))
+    do i = 1, points%n
+      points%place(i, :) = points%runs%place_of(i)
+    end do
+  end subroutine take_apart
 
   !> The first problem, '' where there is none.
   function problem(made) result(text)
