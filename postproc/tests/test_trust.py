@@ -12,6 +12,7 @@ import pytest
 from perigeo_post import measure_band
 from perigeo_post.cli.command_line import main
 from perigeo_post.cli.info import _trust_text
+from perigeo_post.read.errors import ResultError
 from perigeo_post.read.run import Run
 from perigeo_post.read.trust import doubts_of, quality_of
 
@@ -57,6 +58,15 @@ def test_doubts_and_quality_are_read_and_shown(
     facts = json.loads(capsys.readouterr().out)
     assert facts["doubts"][0]["bound"] == "below 50"
     assert facts["doubts"][1]["upper"] is None
+
+
+def test_doubts_with_columns_of_different_lengths_are_damaged(result: Path) -> None:
+    with_trust(result)
+    with h5py.File(result, "a") as file:
+        del file["doubts/value"]
+        file["doubts/value"] = [5.0, 30.0]
+    with pytest.raises(ResultError, match="is damaged: the doubts have columns of different"):
+        doubts_of(result)
 
 
 def test_nothing_is_said_where_nothing_is_known() -> None:

@@ -321,7 +321,7 @@ def differences(numbers, reference):
         if new is None or len(new) != len(values):
             found[name] = math.inf
             continue
-        most = max(abs(a - b) for a, b in zip(new, values, strict=True))
+        most = max(abs(a - b) for a, b in zip(new, values))
         found[name] = most / (scale[kind(name)] or 1.0)
     return found
 

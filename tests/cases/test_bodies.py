@@ -69,7 +69,7 @@ def test_layers_of_a_smooth_edge_are_the_image_of_the_body(fields):
     first = found["position"][body, 1][
         np.abs(found["position"][body, 1] - found["position"][layer, 1].min()) < 0.15
     ].max()
-    for i, k in zip(layer, np.rint(far), strict=True):
+    for i, k in zip(layer, np.rint(far)):
         x, _ = found["position"][i]
         there = np.abs(found["position"][body] - [x, first - 0.1 * k]).max(axis=1) < 1e-6
         assert there.sum() == 1

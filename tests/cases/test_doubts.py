@@ -196,7 +196,7 @@ def doubts_of(path):
         names = [name.decode().strip() for name in group["name"][()]]
         found = {
             name: (int(step), value)
-            for name, step, value in zip(names, group["step"][()], group["value"][()], strict=True)
+            for name, step, value in zip(names, group["step"][()], group["value"][()])
             if step >= 0
         }
         assert file.attrs["doubts"] == len(found)
@@ -205,7 +205,7 @@ def doubts_of(path):
 
 @pytest.mark.parametrize("doubt", AT_START)
 def test_what_is_hardly_meant_is_told_at_the_start(run_case, clouds, tmp_path, doubt):
-    for raised, text in zip((True, False), AT_START[doubt], strict=True):
+    for raised, text in zip((True, False), AT_START[doubt]):
         for cloud in clouds.iterdir():
             (tmp_path / cloud.name).write_bytes(cloud.read_bytes())
         done = run_case(text, tmp_path, "--check")
@@ -216,7 +216,7 @@ def test_what_is_hardly_meant_is_told_at_the_start(run_case, clouds, tmp_path, d
 
 @pytest.mark.parametrize("doubt", IN_THE_RUN)
 def test_what_goes_wrong_in_a_run_is_told_once(run_case, tmp_path, doubt):
-    for raised, text in zip((True, False), IN_THE_RUN[doubt], strict=True):
+    for raised, text in zip((True, False), IN_THE_RUN[doubt]):
         done = run_case(text, tmp_path, "--force")
         assert done.returncode in ((0, 4) if raised else (0,)), done.stderr
         log = (tmp_path / "out" / "case.log").read_text()

@@ -100,6 +100,20 @@ def test_stress_depends_on_no_increment_rule_or_density(rows):
         assert at(rows(text), 0.008) == pytest.approx(reference, rel=5e-3), rule
 
 
+def test_the_control_lets_go_once_per_increment_not_per_move(rows):
+    """The ways of two rules differ in their moves; what has flowed at their ends does not."""
+    text = changed(RESTING, final_strain="0.004").replace(
+        "frame_strains = 0.004, 0.01", "frame_count = 1"
+    )
+    runs = [
+        rows(text.replace("increments = 100", f"increments = 40, relaxation = '{rule}'"))
+        for rule in ("adaptive", "local")
+    ]
+    assert runs[0]["stabilisation_energy"][-1] > 0.5
+    flowed = [run["plastic_dissipation"][-1] for run in runs]
+    assert flowed[1] == pytest.approx(flowed[0], rel=0.01)
+
+
 def test_a_rate_of_the_platens_changes_nothing(rows):
     slow, fast = rows(RESTING), rows(changed(RESTING, velocity="0.0, -10.0"))
     assert fast["bottom_force_y"] == pytest.approx(slow["bottom_force_y"], rel=1e-6)

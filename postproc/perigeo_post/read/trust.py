@@ -46,6 +46,8 @@ def doubts_of(path: Path) -> list[Doubt]:
             np.atleast_1d(file["doubts"][key][()])
             for key in ("name", "meaning", "step", "value", "lower", "upper")
         )
+        if any(len(other) != len(names) for other in (meanings, *numbers)):
+            raise ValueError("the doubts have columns of different lengths")
         found = [
             Doubt(
                 text_of(name).strip(),
@@ -55,9 +57,7 @@ def doubts_of(path: Path) -> list[Doubt]:
                 _bound(upper),
                 text_of(meaning).strip(),
             )
-            for name, meaning, step, value, lower, upper in zip(
-                names, meanings, *numbers, strict=True
-            )
+            for name, meaning, step, value, lower, upper in zip(names, meanings, *numbers)
             if step >= 0
         ]
         return sorted(found, key=lambda doubt: doubt.step)

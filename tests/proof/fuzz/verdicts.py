@@ -196,9 +196,11 @@ def check_printed(program, folder, printed, said):
     """What --print-input prints is an input that says the same, and stays as it is."""
     other = folder / "printed.nml"
     other.write_text(printed)
+    many = bonds(printed) > MANY_BONDS
     try:
         _, again, _ = judge([program, "--print-input", "printed.nml"], folder, (0,))
-        _, out, _ = judge([program, "--check", "--threads", "1", "printed.nml"], folder, (0,))
+        words = [program, "--check", "--threads", "1", "printed.nml"]
+        _, out, _ = judge(words, folder, (0,), may_be_slow=many)
     finally:
         other.unlink()
     if again != printed:
