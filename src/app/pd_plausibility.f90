@@ -79,8 +79,8 @@ contains
     end associate
   end subroutine look_at_scales
 
-  !> Warn of a density that no soil has, of a yield stress that is no part of the stiffness that soil
-  !> could have, and of what Green-Lagrange strain makes of perfect plasticity.
+  !> Warn of a density that no soil has, of a yield stress that is no part of the stiffness that
+  !> soil could have, and of what Green-Lagrange strain makes of perfect plasticity.
   subroutine look_at_material(material, doubts)
     type(material_input_t), intent(in)    :: material
     type(doubts_t),         intent(inout) :: doubts
