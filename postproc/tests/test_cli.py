@@ -340,3 +340,20 @@ def test_outputs_replace_their_like_only(result: Path, capsys: Capture) -> None:
         assert path.read_text() == "notes of a week\n"
     line = refused(capsys, 1, "band", "--csv", "b.csv", "--table", "./b.csv", result)
     assert "two outputs have one name" in line
+
+
+def test_a_tilde_is_the_home_folder(
+    result: Path, tmp_path: Path, capsys: Capture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Behind "=" the shell leaves it to the program; a folder of this name was made."""
+    home, work = tmp_path / "home", tmp_path / "work"
+    home.mkdir()
+    work.mkdir()
+    monkeypatch.setenv("HOME", str(home))
+    monkeypatch.chdir(work)
+    (home / "a.h5").write_bytes(result.read_bytes())
+    assert main(["band", "~/a.h5", "--csv=~/b.csv", "--table=~/c.csv", "-o~/new/d.png"]) == 0
+    assert {path.name for path in home.iterdir()} == {"a.h5", "b.csv", "c.csv", "new"}
+    capsys.readouterr()
+    assert not list(work.iterdir())
+    assert "home folder is not known" in refused(capsys, 1, "band", result, "--csv=~nobody_/b.csv")

@@ -203,7 +203,7 @@ contains
   !> Warn of an end, of steps and of velocities that are out of proportion, and of a time step
   !> that is not stable.
   !>
-  !> Errors: a boundary that passes the whole body in one step.
+  !> Errors: a boundary that passes the whole body in one step; a damping without end.
   subroutine look_at_motion(input, stages, clock, schedule, model, doubts, errors)
     type(input_t),    intent(in)    :: input
     type(stage_t),    intent(in)    :: stages(:)
@@ -228,6 +228,7 @@ contains
       ' steps: waves have hardly passed the body, and the end is passed by up to a step; '// &
       'slower motion, or method = ''equilibrium''', '&integration')
     call look_at_speed(input, clock%time_step, model, doubts, errors)
+    call look_at_damping(input, clock%time_step, errors)
     if (errors%count() > 0) return
     call look_at_stability(input, clock%time_step, model, doubts)
   end subroutine look_at_motion
@@ -270,6 +271,22 @@ contains
     end subroutine look
 
   end subroutine look_at_ramps
+
+  !> Refuse a damping beside whose forces no digit of the others is left: the run would fail by
+  !> round-off alone.
+  subroutine look_at_damping(input, time_step, errors)
+    type(input_t),      intent(in)    :: input
+    real(wp),           intent(in)    :: time_step   !! [s]
+    type(error_list_t), intent(inout) :: errors
+    real(wp), parameter :: most = 1.0e12_wp
+    real(wp) :: rate
+
+    rate = input%integration%damping / minval(input%materials%density)
+    if (rate * time_step < most) return
+    call errors%add('the damping stops every motion within one step of '// &
+      short_number(time_step)//' s', '&integration damping', short_number(rate * time_step)// &
+      ' = damping * time step / density', 'below 1e12')
+  end subroutine look_at_damping
 
   !> Warn of a boundary that moves so fast that the body cannot follow; refuse one that passes all
   !> of it in a step, which nothing can survive.

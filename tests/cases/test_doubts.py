@@ -253,6 +253,14 @@ def test_a_boundary_that_passes_the_body_in_a_step_is_refused(run_case, tmp_path
         assert "name = top: the boundary passes the whole body in one step" in done.stderr
 
 
+def test_a_damping_without_end_is_refused(run_case, tmp_path):
+    for options in ([], ["--check"]):
+        done = run_case(changed(PUSHED, damping="1.0e99"), tmp_path, *options)
+        assert done.returncode == 2
+        assert "&integration damping: the damping stops every motion within one" in done.stderr
+    assert run_case(changed(PUSHED, damping="1.0e15"), tmp_path, "--check").returncode == 0
+
+
 def test_places_have_the_digits_that_they_need(run_case, tmp_path):
     probe = "&probe name = 'p', x = 500000.26, y = 4649776.71 /\n"
     text = changed(SHORT, x_min="500000.0", x_max="500000.5", y_min="4649776.0", y_max="4649777.0")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,6 +18,7 @@ from .options import (
     add_output,
     add_state,
     draw_figure,
+    given_path,
     print_json,
     say,
 )
@@ -28,7 +28,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
     add_files(parser)
     add_output(parser, "write the profile to a CSV file")
     add_state(parser)
-    parser.add_argument("--table", metavar="FILE", type=Path,
+    parser.add_argument("--table", metavar="FILE", type=given_path,
                         help="write the table of both bands to a CSV file")  # fmt: skip
     parser.add_argument("--line", metavar=("X0", "Y0", "X1", "Y1"), nargs=4, type=float,
                         help="line of the profile [m] (default: across the band)")  # fmt: skip

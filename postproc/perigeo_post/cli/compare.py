@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,6 +20,7 @@ from .options import (
     add_output,
     add_signs,
     draw_figure,
+    given_path,
     print_json,
     say,
     strain_value,
@@ -30,7 +30,7 @@ from .options import (
 def add_options(parser: argparse.ArgumentParser) -> None:
     add_files(parser)
     add_output(parser, "write the stress-strain curves to a CSV file")
-    parser.add_argument("--table", metavar="FILE", type=Path,
+    parser.add_argument("--table", metavar="FILE", type=given_path,
                         help="write the table to a CSV file")  # fmt: skip
     which = parser.add_mutually_exclusive_group()
     which.add_argument("--strain", metavar="S", type=strain_value,

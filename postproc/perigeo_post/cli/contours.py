@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -24,6 +23,7 @@ from .options import (
     add_state,
     beside,
     draw_figure,
+    given_path,
     print_json,
     say,
 )
@@ -131,7 +131,7 @@ def frame_numbers(frame: Frame, name: str, fictitious: bool = False) -> dict[str
 
 def add_animate_options(parser: argparse.ArgumentParser) -> None:
     add_files(parser, many=False)
-    parser.add_argument("-o", "--output", metavar="FILE", type=Path,
+    parser.add_argument("-o", "--output", metavar="FILE", type=given_path,
                         help="file to write, .gif or .mp4 (default: a GIF beside it)")  # fmt: skip
     add_json(parser)
     add_colours(parser)

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
 from ..measure import export, vtk_files
 from ..read.errors import RequestError
 from ..read.run import Frame, Run
-from .options import Arguments, add_files, add_state
+from .options import Arguments, add_files, add_state, given_path
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
@@ -18,7 +17,7 @@ def add_options(parser: argparse.ArgumentParser) -> None:
         help="vtu: a file for each frame and a .pvd that ParaView opens (default); csv: a table "
         "for each frame",
     )  # fmt: skip
-    parser.add_argument("-o", "--output", metavar="DIR", type=Path,
+    parser.add_argument("-o", "--output", metavar="DIR", type=given_path,
                         help="folder to write to (default: NAME_export beside it)")  # fmt: skip
     parser.add_argument("--field", metavar="NAME", nargs="+",
                         help="fields (default: all that the file holds)")  # fmt: skip

@@ -12,18 +12,18 @@ import numpy as np
 
 from ..read.errors import RequestError
 from ..read.points_file import BODY, ModelPoints, read_points_file
-from .options import Arguments, add_output, draw_figure, print_json
+from .options import Arguments, add_output, draw_figure, given_path, print_json
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("file", metavar="RUN.nml", type=Path, help="input file")
+    parser.add_argument("file", metavar="RUN.nml", type=given_path, help="input file")
     add_output(parser)
     parser.add_argument(
         "--set", metavar="GROUP.KEY=VALUE", dest="settings", action="append", default=[],
         help="a value in place of that of the file, as often as needed",
     )  # fmt: skip
     parser.add_argument(
-        "--program", metavar="PATH", type=Path,
+        "--program", metavar="PATH", type=given_path,
         help="the program perigeo (default: PERIGEO_BIN, bin/perigeo above RUN.nml, or on PATH)",
     )  # fmt: skip
 

@@ -38,14 +38,22 @@ def strain_value(text: str) -> float:
         raise argparse.ArgumentTypeError(f"'{text}' is not a strain; write 0.01 or 1%") from None
 
 
+def given_path(text: str) -> Path:
+    """A path as it is typed: ~ is the home folder, also where the shell has left it alone."""
+    try:
+        return Path(text).expanduser()
+    except RuntimeError:
+        raise argparse.ArgumentTypeError(f"'{text}': the home folder is not known") from None
+
+
 def add_output(parser: argparse.ArgumentParser, csv: str | None = None) -> None:
     parser.add_argument(
-        "-o", "--output", metavar="FIGURE", type=Path,
+        "-o", "--output", metavar="FIGURE", type=given_path,
         help="file to write, .png, .pdf, .svg or .eps (default: beside the first result)",
     )  # fmt: skip
     add_json(parser)
     if csv:
-        parser.add_argument("--csv", metavar="FILE", type=Path, help=csv)
+        parser.add_argument("--csv", metavar="FILE", type=given_path, help=csv)
 
 
 def add_json(parser: argparse.ArgumentParser) -> None:
@@ -57,9 +65,11 @@ def add_json(parser: argparse.ArgumentParser) -> None:
 
 def add_files(parser: argparse.ArgumentParser, many: bool = True) -> None:
     if many:
-        parser.add_argument("files", metavar="FILE.h5", nargs="+", type=Path, help="result file")
+        parser.add_argument(
+            "files", metavar="FILE.h5", nargs="+", type=given_path, help="result file"
+        )
     else:
-        parser.add_argument("file", metavar="FILE.h5", type=Path, help="result file")
+        parser.add_argument("file", metavar="FILE.h5", type=given_path, help="result file")
 
 
 def add_state(parser: argparse.ArgumentParser, many: bool = False) -> None:

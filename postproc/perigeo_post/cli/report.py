@@ -7,7 +7,7 @@ import sys
 from pathlib import Path
 
 from ..read.errors import OutputError, RequestError, ResultError
-from .options import extra
+from .options import extra, given_path
 
 STUDIES = Path("studies")  # where the study files are looked for
 DOCUMENT = Path("doc/verification.md")
@@ -15,17 +15,17 @@ DOCUMENT = Path("doc/verification.md")
 
 def add_options(parser: argparse.ArgumentParser) -> None:
     """The options of `perigeo-post report`."""
-    parser.add_argument("--results", metavar="DIR", type=Path, default=Path("results"),
+    parser.add_argument("--results", metavar="DIR", type=given_path, default=Path("results"),
                         help="folder of the results (default: results)")  # fmt: skip
-    parser.add_argument("-o", "--output", metavar="FILE", type=Path,
+    parser.add_argument("-o", "--output", metavar="FILE", type=given_path,
                         help="page to write (default: report.html in that folder)")  # fmt: skip
     parser.add_argument(
-        "--studies", metavar="DIR", type=Path,
+        "--studies", metavar="DIR", type=given_path,
         help="folder of the study files; those without results are named (default: studies, "
         "where it is there)",
     )  # fmt: skip
     parser.add_argument(
-        "--publish", metavar="DOCUMENT", type=Path, nargs="?", const=DOCUMENT,
+        "--publish", metavar="DOCUMENT", type=given_path, nargs="?", const=DOCUMENT,
         help="also write the findings between the markers of this document (default: "
         "doc/verification.md), the values into study_tables.md beside it",
     )  # fmt: skip

@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import argparse
 import sys
-from pathlib import Path
 
-from .options import Arguments, extra
+from .options import Arguments, extra, given_path
 
 
 def add_options(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("file", metavar="FILE.toml", type=Path, help="study file")
-    parser.add_argument("--output", metavar="DIR", type=Path,
+    parser.add_argument("file", metavar="FILE.toml", type=given_path, help="study file")
+    parser.add_argument("--output", metavar="DIR", type=given_path,
                         help="folder for results (default: results/<its name>)")  # fmt: skip
     parser.add_argument("--jobs", metavar="N", type=_count,
                         help="runs at a time (default: as many as there are cores)")  # fmt: skip
     parser.add_argument(
-        "--program", metavar="PATH", type=Path,
+        "--program", metavar="PATH", type=given_path,
         help="the program perigeo (default: PERIGEO_BIN, bin/perigeo above FILE, or on PATH)",
     )  # fmt: skip
     parser.add_argument("--only", metavar="RUN", nargs="+", default=[],
