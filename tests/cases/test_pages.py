@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from perigeo_post import Run, stress_strain
+from perigeo_post import Run, measure_band, stress_strain
 from perigeo_post.measure.limit_load import limit_loads
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -156,6 +156,31 @@ def test_the_page_of_an_own_test_is_typed_too(footing_folder, program, capfd, mo
     assert "the input is right" in capfd.readouterr().out
     curve = stress_strain(Run(footing_folder / "results" / "own_test" / "own_test.h5"))
     assert curve.y.max() == pytest.approx(2.0 * 50e3, rel=0.02)
+
+
+def test_the_first_case_of_the_readme_is_typed_too(footing_folder, program, monkeypatch):
+    if program.name != "perigeo":
+        pytest.skip("takes long with all checks")
+    monkeypatch.setenv("OMP_NUM_THREADS", "1")
+    text = (ROOT / "README.md").read_text()
+    text = text.partition("## A first case of your own")[2].partition("\n## ")[0]
+    given = first_footing.commands(text)
+    assert given[0] == "cp input/compression_quick.nml input/my_case.nml"
+    (footing_folder / "input").mkdir()
+    case = (ROOT / "input" / "compression_quick.nml").read_text()
+    for line in re.search(r"^```fortran\n(.*?)^```", text, re.M | re.S)[1].splitlines():
+        key = line.split("=")[0]
+        case, count = re.subn(rf"^{key}=.*$", line, case, count=1, flags=re.M)
+        assert count == 1
+    (footing_folder / "input" / "my_case.nml").write_text(case)
+    first_footing.type_it(given[1:], {}, "", footing_folder)
+    run = Run(footing_folder / "results" / "my_case" / "my_case.h5")
+    said = re.search(r"peak of (\d+) kPa and a band at (\d+) degrees .*\s.*about ([\d.]+) m", text)
+    peak, angle, width = (float(number) for number in said.groups())
+    assert 1e-3 * stress_strain(run).y.max() == pytest.approx(peak, abs=0.6)
+    band = measure_band(run)
+    assert band.bands.prevailing.angle == pytest.approx(angle, abs=0.6)
+    assert band.width == pytest.approx(width, abs=0.006)
 
 
 def test_the_times_of_the_first_footing_are_those_of_its_commands():
