@@ -50,7 +50,14 @@ LIMITS = [line for line in (DOC / "limits.md").read_text().splitlines() if line[
 @pytest.mark.parametrize("line", LIMITS, ids=lambda line: re.sub(r"\W+", "_", line[2:30]))
 def test_the_numbers_of_a_limit_are_published(line):
     said = line.split(" | ")[2]
-    pages = ["choices.md", "model.md", "verification.md", "study_tables.md", "tutorials/figure.md"]
+    pages = [
+        "choices.md",
+        "model.md",
+        "verification.md",
+        "verification_table.md",
+        "study_tables.md",
+        "tutorials/figure.md",
+    ]
     text = "\n".join((DOC / name).read_text() for name in pages)
     numbers = re.findall(r"(?<![\w.-])\d+\.?\d*(?:e-\d+)?", re.sub(r"\]\([^)]*\)", "", said))
     missing = [n for n in numbers if not re.search(rf"(?<![\d.]){re.escape(n)}(?![\d])", text)]
@@ -194,3 +201,13 @@ def test_the_times_of_the_first_footing_are_those_of_its_commands():
     assert first_footing.with_table(new, text) == new
     firsts = re.compile(r"^\| (`.*`|all) \|", re.M)
     assert firsts.findall(page) == firsts.findall(new)  # the page's table has been renewed
+
+
+@pytest.mark.parametrize("place", ["verify/verify.py", "verify/limits.py", "verify/clouds.py"])
+def test_a_table_has_marks_on_the_page_that_it_is_written_to(place):
+    source = (ROOT / "tests" / place).read_text()
+    page = re.search(r'"doc" / "(\w+\.md)"', source)[1]
+    marks = set(re.findall(r"<!-- \w+: (?:begin|end) -->", source))
+    text = (DOC / page).read_text()
+    assert len(marks) > 1
+    assert all(text.count(mark) == 1 for mark in marks)
