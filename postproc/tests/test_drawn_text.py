@@ -74,9 +74,16 @@ def model_of(run: Run) -> ModelPoints:
     top = points[:, 1] > points[:, 1].max() - 0.5 * run.spacing
     load = np.column_stack([points[top], np.tile([0.0, -1e3], (top.sum(), 1))])
     names = np.array(["-", "bottom", "the_top_of_the_body"])
+    (left, low), (right, high) = points.min(axis=0), points.max(axis=0)
+    things = {
+        "load": {"pressure on the top": load},
+        "patch": {"imperfection": np.array([[left, 0.5 * (low + high), 2.0 * run.spacing]])},
+        "probe": {"in_the_middle_of_the_body": np.array([[0.5 * (left + right), low]])},
+        "cut": {"1": np.array([[left, low, 0.5 * (left + right), 0.5 * (low + high)]])},
+    }
     return ModelPoints(
         points, run.volumes, ["a_material_with_a_long_name"] * len(points),
-        names[run.boundary].tolist(), {"load": {"pressure on the top": load}},
+        names[run.boundary].tolist(), things,
     )  # fmt: skip
 
 

@@ -65,6 +65,8 @@ def test_the_container_file_names_what_is_there():
         assert name in copied
     (call,) = (line for line in lines if line.startswith("RUN make"))
     check_make(call.split()[2:])
+    # An image without perigeo-post, for want of a network, is none.
+    assert lines.index("RUN test -x /opt/perigeo/bin/perigeo-post") > lines.index(call)
     last = [line.split()[1] for line in lines if line.startswith("USER")][-1]
     assert last != "root"
     assert f"useradd --create-home --uid 1000 {last}" in text

@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from perigeo_post import Run, stress_strain
+from perigeo_post import Run, measure_band, stress_strain
 from perigeo_post.measure.limit_load import limit_loads
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -50,7 +50,14 @@ LIMITS = [line for line in (DOC / "limits.md").read_text().splitlines() if line[
 @pytest.mark.parametrize("line", LIMITS, ids=lambda line: re.sub(r"\W+", "_", line[2:30]))
 def test_the_numbers_of_a_limit_are_published(line):
     said = line.split(" | ")[2]
-    pages = ["choices.md", "model.md", "verification.md", "study_tables.md", "tutorials/figure.md"]
+    pages = [
+        "choices.md",
+        "model.md",
+        "verification.md",
+        "verification_table.md",
+        "study_tables.md",
+        "tutorials/figure.md",
+    ]
     text = "\n".join((DOC / name).read_text() for name in pages)
     numbers = re.findall(r"(?<![\w.-])\d+\.?\d*(?:e-\d+)?", re.sub(r"\]\([^)]*\)", "", said))
     missing = [n for n in numbers if not re.search(rf"(?<![\d.]){re.escape(n)}(?![\d])", text)]
@@ -158,6 +165,31 @@ def test_the_page_of_an_own_test_is_typed_too(footing_folder, program, capfd, mo
     assert curve.y.max() == pytest.approx(2.0 * 50e3, rel=0.02)
 
 
+def test_the_first_case_of_the_readme_is_typed_too(footing_folder, program, monkeypatch):
+    if program.name != "perigeo":
+        pytest.skip("takes long with all checks")
+    monkeypatch.setenv("OMP_NUM_THREADS", "1")
+    text = (ROOT / "README.md").read_text()
+    text = text.partition("## A first case of your own")[2].partition("\n## ")[0]
+    given = first_footing.commands(text)
+    assert given[0] == "cp input/compression_quick.nml input/my_case.nml"
+    (footing_folder / "input").mkdir()
+    case = (ROOT / "input" / "compression_quick.nml").read_text()
+    for line in re.search(r"^```fortran\n(.*?)^```", text, re.M | re.S)[1].splitlines():
+        key = line.split("=")[0]
+        case, count = re.subn(rf"^{key}=.*$", line, case, count=1, flags=re.M)
+        assert count == 1
+    (footing_folder / "input" / "my_case.nml").write_text(case)
+    first_footing.type_it(given[1:], {}, "", footing_folder)
+    run = Run(footing_folder / "results" / "my_case" / "my_case.h5")
+    said = re.search(r"peak of (\d+) kPa and a band at (\d+) degrees .*\s.*about ([\d.]+) m", text)
+    peak, angle, width = (float(number) for number in said.groups())
+    assert 1e-3 * stress_strain(run).y.max() == pytest.approx(peak, abs=0.6)
+    band = measure_band(run)
+    assert band.bands.prevailing.angle == pytest.approx(angle, abs=0.6)
+    assert band.width == pytest.approx(width, abs=0.006)
+
+
 def test_the_times_of_the_first_footing_are_those_of_its_commands():
     page = first_footing.PAGE.read_text()
     timed = [
@@ -169,3 +201,13 @@ def test_the_times_of_the_first_footing_are_those_of_its_commands():
     assert first_footing.with_table(new, text) == new
     firsts = re.compile(r"^\| (`.*`|all) \|", re.M)
     assert firsts.findall(page) == firsts.findall(new)  # the page's table has been renewed
+
+
+@pytest.mark.parametrize("place", ["verify/verify.py", "verify/limits.py", "verify/clouds.py"])
+def test_a_table_has_marks_on_the_page_that_it_is_written_to(place):
+    source = (ROOT / "tests" / place).read_text()
+    page = re.search(r'"doc" / "(\w+\.md)"', source)[1]
+    marks = set(re.findall(r"<!-- \w+: (?:begin|end) -->", source))
+    text = (DOC / page).read_text()
+    assert len(marks) > 1
+    assert all(text.count(mark) == 1 for mark in marks)

@@ -5,7 +5,7 @@ printed as a table (quantity, reference, computed, difference and tolerance in i
 and written to results/verify/verify.json and verify.md; exit status 1 when one of them fails.
 
     verify.py [CASE ...]   only these cases (names: verify.py --list)
-    verify.py --publish    all cases, and the table into doc/verification.md
+    verify.py --publish    all cases, and the table into doc/verification_table.md
 """
 
 from __future__ import annotations
@@ -840,7 +840,7 @@ def print_table(rows: list[Row]) -> None:
 
 
 def save(rows: list[Row], results: Path) -> None:
-    """verify.json for programs, verify.md for doc/verification.md."""
+    """verify.json for programs, verify.md for doc/verification_table.md."""
     results.mkdir(parents=True, exist_ok=True)
     data = [vars(row) | {"error": row.error, "passed": row.passed} for row in rows]
     (results / "verify.json").write_text(json.dumps(data, indent=1) + "\n")
@@ -856,8 +856,8 @@ def save(rows: list[Row], results: Path) -> None:
 
 
 def publish() -> None:
-    """Put verify.md between the markers of doc/verification.md."""
-    page = ROOT / "doc" / "verification.md"
+    """Put verify.md between the markers of doc/verification_table.md."""
+    page = ROOT / "doc" / "verification_table.md"
     begin, end = "<!-- verify: begin -->", "<!-- verify: end -->"
     before, rest = page.read_text().split(begin)
     after = rest.split(end)[1]
@@ -869,7 +869,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("cases", nargs="*", metavar="CASE", help="only these cases")
     parser.add_argument(
-        "--publish", action="store_true", help="put the table into doc/verification.md"
+        "--publish", action="store_true", help="put the table into doc/verification_table.md"
     )
     parser.add_argument("--list", action="store_true", help="list the cases")
     arguments = parser.parse_args()

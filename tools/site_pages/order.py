@@ -54,6 +54,7 @@ GROUPS = {
     "Theory and proof": [
         "doc/theory.md",
         "doc/verification.md",
+        "doc/verification_table.md",
         "doc/study_tables.md",
     ],
     "Develop": [
