@@ -100,9 +100,10 @@ contains
     character(*),       intent(in)    :: name
     integer,            intent(in)    :: n
     type(error_list_t), intent(inout) :: errors
-    real(wp) :: part(1, most)
-    integer  :: first, k, last
+    real(wp), allocatable :: part(:, :)   ! on the heap
+    integer :: first, k, last
 
+    allocate (part(1, most))
     call reserve_whole_numbers(file, name, [n, 1], errors)
     do first = 1, n, most
       last = min(n, first + most - 1)
