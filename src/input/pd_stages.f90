@@ -62,6 +62,7 @@ contains
     type(input_t), intent(in) :: input
     type(stage_t), allocatable :: stages(:)   ! what ASSOCIATE names gfortran does not free
 
+    allocate (stages(0))   ! else gfortran warns of it, without reason
     stages = stages_of(input)
     first = stages(1)
   end function first_stage
