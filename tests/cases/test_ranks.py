@@ -21,6 +21,7 @@ from test_bearings import BOX, HALF, MOTION, REST
 from test_equilibrium import RESTING
 from test_ground import CLAY, COLUMN, EQUILIBRIUM, FOOTING, MOVING
 from test_stages import BAR, BLOCKS
+from test_stopping import SLOW
 from test_strain_control import RESTING as LABORATORY
 
 TIME_LIMIT = 300.0
@@ -240,6 +241,21 @@ def test_a_run_goes_on_with_any_number_of_ranks(start, run, tmp_path):
         assert process.wait(TIME_LIMIT) == 143
         assert rows <= rows_written(out) < 401
     status, said, _ = run(LONG, "ranks", 3, "--restart")
+    assert status == 0, said
+    same_results(serial, out)
+
+
+def test_an_increment_is_taken_back_on_all_ranks(start, run, tmp_path):
+    text = SLOW["increments"].replace("&output ", "&output checkpoint_every = 1.0e9, ")
+    status, said, serial = run(text, "serial", 0)
+    assert status == 0, said
+    out = tmp_path / "ranks" / "out"
+    process = start(text, "ranks", 2)
+    wait_for_rows(process, out, 4)  # the third increment takes a second or more
+    process.send_signal(signal.SIGUSR1)
+    assert process.wait(TIME_LIMIT) == 143
+    assert rows_written(out) == 4
+    status, said, _ = run(text, "ranks", 3, "--restart")
     assert status == 0, said
     same_results(serial, out)
 
