@@ -30,6 +30,7 @@ module pd_blocks
     procedure :: spread_rows
     procedure :: total
     procedure :: totals
+    procedure :: total_of_rows
     procedure :: largest
     procedure :: smallest
     procedure :: lowest_number
@@ -143,6 +144,21 @@ contains
       totals(k) = sum(all_parts(k, :))
     end do
   end function totals
+
+  !> Sum over all rows of all blocks, block by block.
+  real(wp) function total_of_rows(self, terms) result(total)
+    class(blocks_t), intent(in) :: self
+    real(wp),        intent(in) :: terms(:)   !! one number per row of this rank
+    real(wp) :: parts(self%count)
+    integer  :: block
+
+    do block = 1, self%count
+      associate (lo => self%lo(block) - self%first + 1, hi => self%hi(block) - self%first + 1)
+        parts(block) = sum(terms(lo:hi))
+      end associate
+    end do
+    total = self%total(parts)
+  end function total_of_rows
 
   !> Largest number of any block.
   real(wp) function largest(self, parts)

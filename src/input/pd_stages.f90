@@ -62,7 +62,8 @@ contains
     type(input_t), intent(in) :: input
     type(stage_t), allocatable :: stages(:)   ! what ASSOCIATE names gfortran does not free
 
-    allocate (stages, source=stages_of(input))
+    allocate (stages(0))   ! else gfortran warns of it, without reason
+    stages = stages_of(input)
     first = stages(1)
   end function first_stage
 

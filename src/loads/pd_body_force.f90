@@ -7,6 +7,7 @@ module pd_body_force
   use pd_blocks, only: blocks_t, new_blocks
   use pd_kinds, only: ordered_sum, wp
   use pd_loads, only: load_t
+  use pd_pages, only: clear_rows
   use pd_tables, only: new_ramp, table_t
   use pd_text, only: short_number
   implicit none
@@ -23,6 +24,8 @@ module pd_body_force
     real(wp), private :: ramp_time = 0.0_wp       !! full load from then on [s]
     character(:), allocatable, private :: text    !! what it is
     type(blocks_t), private :: blocks             !! of this rank
+    real(wp), allocatable, private :: in_all(:)   !! force of all ranks at full load [N/m]; not
+                                                  !! allocated: this rank has all of b
   contains
     procedure :: add_forces
     procedure :: work
@@ -36,23 +39,36 @@ module pd_body_force
 
 contains
 
-  !> Body force on rows with these volumes.
-  pure type(body_force_t) function new_body_force(kind, density, volume, ramp_time, acceleration, &
-    text) result(load)
+  !> Body force on rows with these volumes; of divided blocks every rank knows its own, and must
+  !> come here.
+  type(body_force_t) function new_body_force(kind, density, volume, ramp_time, acceleration, &
+    text, blocks) result(load)
     character(*), intent(in) :: kind              !! in a word
     real(wp),     intent(in) :: density(:, :)     !! b at full load (n,2) [N/m^3]
     real(wp),     intent(in) :: volume(:)         !! V (n) [m^2]
     real(wp),     intent(in) :: ramp_time         !! full load from then on [s]
     real(wp),     intent(in) :: acceleration(2)   !! that makes b; 0: none does [m/s^2]
     character(*), intent(in) :: text              !! what it is
+    type(blocks_t), optional, intent(in) :: blocks   !! of this rank; absent: all rows are known
+    integer :: acts(2), c
 
     load%name = kind
     load%kind = kind
     load%text = text
-    allocate (load%density(size(density, 1), 2), source=density)
-    allocate (load%volume(size(volume)), source=volume)
     load%blocks = new_blocks(1, size(volume))
-    load%acts = [any(abs(density(:, 1)) > 0.0_wp), any(abs(density(:, 2)) > 0.0_wp)]
+    if (present(blocks)) load%blocks = blocks
+    allocate (load%density(size(density, 1), 2), load%volume(size(volume)))
+    associate (a => load%blocks%first, b => load%blocks%last)
+      call clear_rows(load%density, [a, b])
+      call clear_rows(load%volume, [a, b])
+      load%density(a:b, :) = density(a:b, :)
+      load%volume(a:b) = volume(a:b)
+    end associate
+    acts = [(merge(1, 0, any(abs(load%density(:, c)) > 0.0_wp)), c=1, 2)]
+    call load%blocks%ranks%largest_numbers(acts)
+    load%acts = acts > 0
+    if (allocated(load%blocks%ranks%before)) &
+      load%in_all = [(load%blocks%total(sums_of_blocks(load, c)), c=1, 2)]
     load%ramp_time = ramp_time
     load%factor = new_ramp(ramp_time)
     load%full_acceleration = acceleration
@@ -116,9 +132,26 @@ contains
     class(body_force_t), intent(in) :: self
     real(wp) :: force(2)
 
-    force = [ordered_sum(self%volume * self%density(:, 1)), &
-      ordered_sum(self%volume * self%density(:, 2))]
+    if (allocated(self%in_all)) then
+      force = self%in_all
+    else
+      force = [sum(sums_of_blocks(self, 1)), sum(sums_of_blocks(self, 2))]
+    end if
   end function total
+
+  !> Force at full load on the rows of each block of this rank [N/m].
+  pure function sums_of_blocks(self, c) result(sums)
+    class(body_force_t), intent(in) :: self
+    integer,             intent(in) :: c   !! component; 1: x, 2: y
+    real(wp) :: sums(self%blocks%count)
+    integer  :: block
+
+    do block = 1, self%blocks%count
+      associate (lo => self%blocks%lo(block), hi => self%blocks%hi(block))
+        sums(block) = ordered_sum(self%volume(lo:hi) * self%density(lo:hi, c))
+      end associate
+    end do
+  end function sums_of_blocks
 
   !> From now on this rank has its own blocks only.
   pure subroutine divide(self, blocks)

@@ -15,8 +15,8 @@ module pd_increment
   use pd_kinds, only: wp
   use pd_ledger, only: ledger_t
   use pd_model, only: model_t
-  use pd_relaxation, only: keep_start, relax, relaxation_t, relaxed_t, new_relaxation, &
-    return_to_start
+  use pd_relaxation, only: copy_rows, keep_start, relax, relaxation_t, relaxed_t, &
+    new_relaxation, return_to_start
   use pd_schedule, only: schedule_t
   use pd_state, only: state_t
   use pd_timing, only: timing_t
@@ -139,8 +139,11 @@ contains
     type(state_t),      intent(inout) :: state
     type(increments_t), intent(in)    :: increments
 
-    call return_to_start(increments%relaxation, state)
-    state%displacement = increments%relaxation%displacement
+    associate (relaxation => increments%relaxation)
+      call return_to_start(relaxation, state)
+      call copy_rows(relaxation%displacement, relaxation%ends, relaxation%shared, &
+        state%displacement)
+    end associate
     call find_gradient(model, t, state)
   end subroutine take_back
 
@@ -153,8 +156,12 @@ contains
     type(state_t),      intent(inout) :: state
     real(wp), allocatable :: place(:), prescribed(:, :)
 
-    state%displacement = relaxation%displacement + duration * model%points%free * state%velocity
-    allocate (prescribed, source=state%velocity)
+    associate (a => relaxation%ends(1), b => relaxation%ends(2), rows => relaxation%shared, &
+      start => relaxation%displacement, free => model%points%free, v => state%velocity)
+      state%displacement(a:b, :) = start(a:b, :) + duration * free(a:b, :) * v(a:b, :)
+      state%displacement(rows, :) = start(rows, :) + duration * free(rows, :) * v(rows, :)
+    end associate
+    allocate (prescribed(size(state%velocity, 1), 2))   ! is written where supports are, not read
     call model%supports%prescribe(t + duration, state%displacement, prescribed)
     associate (mirror => model%operators%mirror)
       if (mirror%n == 0) return
@@ -176,7 +183,11 @@ contains
     call return_to_start(relaxation, state)
     if (allocated(model%operators%relaxing)) call model%operators%relaxing%follow(0.0_wp)
     call forces(model, t + duration, state, relaxation%blocks, timing, failed_row)
-    state%velocity = (state%displacement - relaxation%displacement) / duration
+    associate (a => relaxation%ends(1), b => relaxation%ends(2), rows => relaxation%shared, &
+      start => relaxation%displacement, u => state%displacement)
+      state%velocity(a:b, :) = (u(a:b, :) - start(a:b, :)) / duration
+      state%velocity(rows, :) = (u(rows, :) - start(rows, :)) / duration
+    end associate
     call model%pushed%bring(state%velocity)
   end subroutine settle
 
@@ -225,9 +236,10 @@ contains
 
     call find_loads(model, t, before)
     call find_loads(model, t + duration, load)
-    load = 0.5_wp * (load - before) * (state%displacement - relaxation%guess)
     do block = 1, model%blocks%count
       associate (lo => model%blocks%lo(block), hi => model%blocks%hi(block))
+        load(lo:hi, :) = 0.5_wp * (load(lo:hi, :) - before(lo:hi, :)) &
+          * (state%displacement(lo:hi, :) - relaxation%guess(lo:hi, :))
         parts(block) = sum(model%points%volume(lo:hi) * (load(lo:hi, 1) + load(lo:hi, 2)))
       end associate
     end do

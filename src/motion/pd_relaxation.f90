@@ -24,6 +24,7 @@ module pd_relaxation
   use pd_forces, only: internal_forces
   use pd_kinds, only: block_sum, n_block, wp
   use pd_model, only: model_t
+  use pd_pages, only: clear_rows
   use pd_points, only: points_t
   use pd_state, only: block_work_t, state_t
   use pd_timing, only: kernel_boundaries, kernel_motion, timing_t
@@ -32,7 +33,7 @@ module pd_relaxation
   private
 
   public :: relaxation_t, new_relaxation, relaxed_t, keep_start, return_to_start, relax
-  public :: numbers_per_row
+  public :: numbers_per_row, copy_rows
 
   !> How to come to equilibrium, and work space.
   type :: relaxation_t
@@ -41,6 +42,8 @@ module pd_relaxation
     integer  :: most_moves = 20000      !! of one increment
     type(block_work_t) :: blocks
     integer  :: moves = 0               !! evaluations of the forces so far
+    integer  :: ends(2) = 0             !! first and last row that this rank knows, and rows that
+    integer, allocatable :: shared(:)   !! all ranks know: others take no memory
     real(wp), allocatable, private :: step(:)               !! s (n) [m^3/kg s^2]
     real(wp), allocatable, private :: kept(:, :)            !! m (n,2) [m]
     real(wp), allocatable, private :: move(:, :)            !! w (n,2) [m]
@@ -91,15 +94,31 @@ contains
     character(*),       intent(in)  :: rule
     real(wp),           intent(in)  :: residual
     type(relaxation_t), intent(out) :: relaxation
-    integer :: n
+    integer :: k, n
 
     n = size(model%points%volume)
+    relaxation%ends = model%operators%domain%kept(n)
+    if (model%operators%mirror%n > 0) relaxation%ends = [1, n]   ! images are made of any rows
+    allocate (relaxation%shared(0))
+    if (allocated(model%shared%rows)) relaxation%shared = [model%shared%rows, model%pushed%rows]
     relaxation%rule = rule
     relaxation%residual = residual
-    allocate (relaxation%kept(n, 2), relaxation%move(n, 2), relaxation%force_before(n, 2), &
-      relaxation%sums(n_sums, model%blocks%count), source=0.0_wp)
-    allocate (relaxation%step(n), source=4.0_wp &
-      / (model%highest_frequency**2 * model%materials%density_of(n)))
+    allocate (relaxation%kept(n, 2), relaxation%move(n, 2), relaxation%force_before(n, 2))
+    call clear_rows(relaxation%kept, relaxation%ends)
+    call clear_rows(relaxation%move, relaxation%ends)
+    call clear_rows(relaxation%force_before, relaxation%ends)
+    allocate (relaxation%sums(n_sums, model%blocks%count), source=0.0_wp)
+    allocate (relaxation%step(n))
+    call clear_rows(relaxation%step, relaxation%ends)
+    associate (a => relaxation%ends(1), b => relaxation%ends(2), materials => model%materials)
+      relaxation%step(a:b) = 4.0_wp / (model%highest_frequency**2 * materials%list(1)%density)
+      do k = 1, size(materials%runs)
+        associate (run => materials%runs(k))
+          relaxation%step(run%lo:run%hi) = 4.0_wp &
+            / (model%highest_frequency**2 * materials%list(run%material)%density)
+        end associate
+      end do
+    end associate
   end subroutine new_relaxation
 
   !> Numbers that the work space has in a row.
@@ -114,22 +133,41 @@ contains
     type(relaxation_t), intent(inout) :: relaxation
     type(state_t),      intent(in)    :: state
 
-    relaxation%displacement = state%displacement
-    relaxation%stress = state%stress
-    relaxation%history = state%history
-    relaxation%control_memory = state%control_memory
-    relaxation%start_force = state%force
+    associate (ends => relaxation%ends, shared => relaxation%shared)
+      call copy_rows(state%displacement, ends, shared, relaxation%displacement)
+      call copy_rows(state%stress, ends, shared, relaxation%stress)
+      call copy_rows(state%history, ends, shared, relaxation%history)
+      call copy_rows(state%control_memory, ends, shared, relaxation%control_memory)
+      call copy_rows(state%force, ends, shared, relaxation%start_force)
+    end associate
   end subroutine keep_start
+
+  !> Rows of a field that this rank knows, and those that all know, go into another field.
+  subroutine copy_rows(from, ends, shared, to)
+    real(wp), intent(in) :: from(:, :)
+    integer,  intent(in) :: ends(2)     !! first and last row
+    integer,  intent(in) :: shared(:)   !! further rows
+    real(wp), allocatable, intent(inout) :: to(:, :)   !! not allocated: a new one
+
+    if (.not. allocated(to)) then
+      allocate (to(size(from, 1), size(from, 2)))
+      call clear_rows(to, ends)
+    end if
+    to(ends(1):ends(2), :) = from(ends(1):ends(2), :)
+    to(shared, :) = from(shared, :)
+  end subroutine copy_rows
 
   !> The state at the start of the increment, but for the displacement.
   subroutine return_to_start(relaxation, state)
     type(relaxation_t), intent(in)    :: relaxation
     type(state_t),      intent(inout) :: state
 
-    state%stress = relaxation%stress
-    state%history = relaxation%history
-    state%control_memory = relaxation%control_memory
-    state%force = relaxation%start_force
+    associate (ends => relaxation%ends, shared => relaxation%shared)
+      call copy_rows(relaxation%stress, ends, shared, state%stress)
+      call copy_rows(relaxation%history, ends, shared, state%history)
+      call copy_rows(relaxation%control_memory, ends, shared, state%control_memory)
+      call copy_rows(relaxation%start_force, ends, shared, state%force)
+    end associate
   end subroutine return_to_start
 
   !> Move the body from a first guess until it is at rest, or a signal comes; prescribed components
@@ -147,10 +185,12 @@ contains
     integer  :: k
 
     loads = loads_at(model, t)
-    relaxation%kept = 0.0_wp
-    relaxation%guess = state%displacement
-    relaxation%move = state%displacement - relaxation%displacement
-    relaxation%force_before = relaxation%start_force
+    associate (a => relaxation%ends(1), b => relaxation%ends(2))
+      relaxation%kept(a:b, :) = 0.0_wp
+      call copy_rows(state%displacement, relaxation%ends, relaxation%shared, relaxation%guess)
+      relaxation%move(a:b, :) = state%displacement(a:b, :) - relaxation%displacement(a:b, :)
+      relaxation%force_before(a:b, :) = relaxation%start_force(a:b, :)
+    end associate
     allocate (relaxed%work(model%blocks%count), source=0.0_wp)
     do k = 1, relaxation%most_moves
       call follow_flow(k, model)

@@ -23,8 +23,7 @@ module pd_hdf5
   public :: create_group, object_exists, remove_object
   public :: reserve_dataset, reserve_whole_numbers
   public :: write_dataset, overwrite_dataset, overwrite_rows, overwrite_part, overwrite_some_rows
-  public :: read_dataset, read_rows
-  public :: write_attribute, read_attribute
+  public :: read_dataset, read_rows, write_attribute, read_attribute
 
   !> Write an array into the file as a new dataset.
   interface write_dataset
@@ -216,7 +215,7 @@ contains
     call overwrite_some_rows(file, name, first, reshape(values, [1, size(values)]), errors)
   end subroutine overwrite_part
 
-  !> The same with all components of a point together; with one component the dataset has rank 1.
+  !> The same with all components of a point together, or one in a dataset of rank 1.
   subroutine overwrite_some_rows(file, name, first, values, errors)
     type(hdf5_file_t),  intent(inout) :: file
     character(*),       intent(in)    :: name
@@ -225,19 +224,20 @@ contains
     type(error_list_t), intent(inout) :: errors
     integer(hid_t)   :: dataset, space, part
     integer(hsize_t) :: start(2), length(2)
-    integer :: axis, status, ignored   ! axis: the first that the dataset has
+    integer :: rank, status, ignored
 
     if (.not. file%is_good() .or. size(values) == 0) return
     start = int([0, first - 1], hsize_t)
     length = shape(values, kind=hsize_t)
-    axis = merge(2, 1, size(values, 1) == 1)
     call h5dopen_f(file%id, name, dataset, status)
     call check(file, status, name//' cannot be opened', errors)
     if (file%failed) return
     call h5dget_space_f(dataset, space, status)
     if (status >= 0) then
-      call h5sselect_hyperslab_f(space, h5s_select_set_f, start(axis:), length(axis:), status)
-      if (status >= 0) call h5screate_simple_f(3 - axis, length(axis:), part, status)
+      call h5sget_simple_extent_ndims_f(space, rank, status)
+      call h5sselect_hyperslab_f(space, h5s_select_set_f, start(3 - rank:), length(3 - rank:), &
+        status)
+      if (status >= 0) call h5screate_simple_f(rank, length(3 - rank:), part, status)
       if (status >= 0) then
         call h5dwrite_f(dataset, h5t_native_double, c_loc(values), status, part, space)
         call h5sclose_f(part, ignored)

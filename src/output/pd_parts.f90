@@ -14,7 +14,8 @@ module pd_parts
   implicit none
   private
 
-  public :: put_parts, put_field, write_in_parts, write_boundaries, reserve_values, as_column
+  public :: put_parts, put_field, write_in_parts, write_boundaries, write_numbers, &
+    reserve_values, as_column
 
   integer, parameter :: most = 2**15   ! points at a time
 
@@ -92,6 +93,26 @@ contains
       call overwrite_part(file, name, first, real(body%boundaries([first, last]), wp), errors)
     end do
   end subroutine write_boundaries
+
+  !> Write the numbers of n points, from 0, into a new dataset: they are the cells of the XDMF file.
+  subroutine write_numbers(file, name, n, errors)
+    type(hdf5_file_t),  intent(inout) :: file
+    character(*),       intent(in)    :: name
+    integer,            intent(in)    :: n
+    type(error_list_t), intent(inout) :: errors
+    real(wp), allocatable :: part(:, :)   ! on the heap
+    integer :: first, k, last
+
+    allocate (part(1, most))
+    call reserve_whole_numbers(file, name, [n, 1], errors)
+    do first = 1, n, most
+      last = min(n, first + most - 1)
+      do k = first, last
+        part(1, k - first + 1) = real(k - 1, wp)
+      end do
+      call overwrite_some_rows(file, name, first, part(:, :last - first + 1), errors)
+    end do
+  end subroutine write_numbers
 
   !> A dataset for the values of points; with one component of rank 1.
   subroutine reserve_values(file, name, numbers, errors)

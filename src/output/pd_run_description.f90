@@ -4,12 +4,11 @@ module pd_run_description
   use pd_errors, only: error_list_t
   use pd_frame_fields, only: frame_field_t
   use pd_frames, only: write_label
-  use pd_hdf5, only: create_group, hdf5_file_t, overwrite_dataset, read_attribute, &
-    reserve_whole_numbers, write_attribute, write_dataset
+  use pd_hdf5, only: create_group, hdf5_file_t, read_attribute, write_attribute, write_dataset
   use pd_kinds, only: wp
   use pd_labels, only: label_t
   use pd_observe, only: column_t
-  use pd_parts, only: reserve_values, write_boundaries
+  use pd_parts, only: reserve_values, write_boundaries, write_numbers
   use pd_system, only: host_name, process_number
   use pd_text, only: integer_text
   use pd_trust, only: reserve_trust
@@ -153,7 +152,9 @@ contains
     call write_label(file, '/points/boundary', label_t('', '1', &
       'boundary that a fictitious point belongs to, counted from 1; 0: a point of the body'), &
       errors)
-    call write_numbers(file, size(description%boundary), errors)
+    call write_numbers(file, '/points/number', description%n, errors)
+    call write_label(file, '/points/number', label_t('', '1', 'number of the point, from 0'), &
+      errors)
     if (allocated(description%yield_stress)) then
       if (description%in_parts) then
         call reserve_values(file, '/points/yield_stress', [description%n, 1], errors)
@@ -173,24 +174,6 @@ contains
     call write_label(file, '/points/boundary_names', label_t('', '1', &
       'names of the boundaries'), errors)
   end subroutine write_points
-
-  !> The numbers of the points, which are the cells of the XDMF file.
-  subroutine write_numbers(file, n, errors)
-    type(hdf5_file_t),  intent(inout) :: file
-    integer,            intent(in)    :: n
-    type(error_list_t), intent(inout) :: errors
-    character(*), parameter :: name = '/points/number'
-    real(wp), allocatable :: numbers(:, :)
-    integer :: k
-
-    allocate (numbers(n, 1))
-    do k = 1, n
-      numbers(k, 1) = real(k - 1, wp)
-    end do
-    call reserve_whole_numbers(file, name, [n, 1], errors)
-    call overwrite_dataset(file, name, numbers, errors)
-    call write_label(file, name, label_t('', '1', 'number of the point, from 0'), errors)
-  end subroutine write_numbers
 
   !> The time now as ISO 8601 in UTC, '2024-05-31T09:30:00Z'.
   function utc_time() result(text)

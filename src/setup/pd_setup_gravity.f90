@@ -23,26 +23,34 @@ contains
   subroutine set_up_gravity(input, model)
     type(input_t), intent(in)    :: input
     type(model_t), intent(inout) :: model
-    real(wp), allocatable :: density(:, :), mass(:)
+    real(wp), allocatable :: density(:, :)
     character(:), allocatable :: text
     real(wp) :: layers(2)
-    integer  :: c, n
+    integer  :: c, k
 
-    associate (g => input%gravity%acceleration, points => model%points)
+    associate (g => input%gravity%acceleration, points => model%points, &
+      storage => model%operators%storage, blocks => model%blocks)
       if (size(g) == 0) return
-      n = model%operators%n
-      allocate (mass(n), source=model%materials%density_of(n))
-      allocate (density(n, 2), &
-        source=model%operators%storage%spread(carries(input, model%body%boundary)))
+      call storage%new_field(carries(input, model%body%boundaries(storage%points)), density)
+      do k = 1, size(model%materials%runs)
+        associate (run => model%materials%runs(k))
+          do c = 1, 2
+            density(run%lo:run%hi, c) = density(run%lo:run%hi, c) &
+              * (model%materials%list(run%material)%density * g(c))
+          end do
+        end associate
+      end do
       do c = 1, 2
-        density(:, c) = density(:, c) * (mass * g(c))
-        layers(c) = sum((1.0_wp - points%in_body) * points%volume * density(:, c))
+        associate (i => blocks%first, j => blocks%last)
+          layers(c) = blocks%total_of_rows((1.0_wp - points%in_body(i:j)) * points%volume(i:j) &
+            * density(i:j, c))
+        end associate
       end do
       text = short_number(g(1))//', '//short_number(g(2))//' m/s^2'
       if (any(abs(layers) > 0.0_wp)) text = text//', layers that slide have '// &
         short_number(layers(1))//', '//short_number(layers(2))//' N/m of it'
       call model%loads%append(new_body_force('gravity', density, points%volume, &
-        input%gravity%ramp_time, g, text))
+        input%gravity%ramp_time, g, text, blocks))
     end associate
   end subroutine set_up_gravity
 

@@ -19,12 +19,15 @@ contains
     integer :: k
 
     looks_near = size(input%stages) == 0 .and. size(input%pressures) == 0 &
-      .and. size(input%gravity%acceleration) == 0 .and. .not. is_set(input%initial_stress%k0) &
+      .and. .not. is_set(input%initial_stress%k0) &
       .and. .not. is_set(input%random_field%coefficient_of_variation) &
       .and. .not. is_set(input%random_field%correlation_length) &
       .and. size(input%cuts) == 0 .and. input%run%operators /= 'list'
     do k = 1, size(input%boundaries)
       looks_near = looks_near .and. .not. is_bearing(input%boundaries(k))
+      ! points that begin to be moved lose their weight, which every rank adds up
+      if (size(input%gravity%acceleration) > 0) &
+        looks_near = looks_near .and. .not. is_set(input%boundaries(k)%traction_until)
     end do
     do k = 1, size(input%materials)
       looks_near = looks_near &

@@ -7,7 +7,10 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path[:0] = [str(ROOT / "tests" / "proof" / name) for name in ("compilers", "pythons", "fuzz")]
+PROOFS = ROOT / "tests" / "proof"
+sys.path[:0] = [str(PROOFS / name) for name in ("compilers", "fuzz", "pythons", "sanitize")]
+sys.path.insert(0, str(PROOFS))  # what they share
+import addresses  # noqa: E402
 import compilers  # noqa: E402
 import pythons  # noqa: E402
 import verdicts  # noqa: E402
@@ -64,6 +67,13 @@ def test_a_large_printed_input_may_take_its_time(monkeypatch, tmp_path):
         text = FOOTING.format(width=width)
         verdicts.check_printed("perigeo", tmp_path, text, text)
     assert patience == [False, True]
+
+
+def test_the_quick_form_of_addresses_names_suites_that_are_there():
+    for name in addresses.QUICK_SUITES:
+        assert list((ROOT / "tests" / "unit").glob(f"*/{name}.pf")), name
+    for name in addresses.CASES:
+        assert (ROOT / "tests" / "cases" / name).is_file(), name
 
 
 @pytest.mark.parametrize("name", ["compilers", "pythons", "fuzz", "soak", "sanitize", "mutants"])

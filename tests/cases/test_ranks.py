@@ -319,6 +319,16 @@ def test_a_rank_has_memory_for_its_own_points_only(start):
     assert ranks - small_ranks < 0.33 * (serial - small), peaks
 
 
+@pytest.mark.parametrize(
+    ("name", "whole"), [("lattice", False), ("gravity", False), ("loads", True), ("cloud", True)]
+)
+def test_the_check_tells_what_every_rank_sets_up_whole(start, name, whole):
+    process = start(CASES[name], "check", 2, "--check")
+    told, said = process.communicate(timeout=TIME_LIMIT)
+    assert process.returncode == 0, said
+    assert ("that of the whole body" in told) == whole
+
+
 # ------------------------------------------------------------------------------- errors
 
 
@@ -327,6 +337,15 @@ def test_an_error_of_the_input_is_told_once(run):
     assert status == 2
     assert said.count("perigeo: error:") == 1
     assert "spacing" in said
+
+
+def test_memory_is_asked_for_all_ranks_of_the_machine(run):
+    if os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") > 40e9:
+        pytest.skip("this machine has room for it")
+    text = changed(SPECIMEN, spacing="1.0e-4", horizon="3.0e-4", x_max="0.9999", y_max="0.9999")
+    status, said, _ = run(text, "huge", 3)  # 1e8 points, of which each rank has a third
+    assert status == 3
+    assert "15 GB for each of 3 ranks on this machine" in said
 
 
 def test_a_calculation_that_fails_ends_all_ranks_at_the_same_state(run):

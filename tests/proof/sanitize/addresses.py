@@ -24,7 +24,7 @@ CASES = (
     "test_bodies.py", "test_exit_status.py", "test_loads.py", "test_result_files.py",
     "test_restart.py", "test_stability.py", "test_stages.py",
 )  # fmt: skip
-QUICK_SUITES = ("test_pd_cloud", "test_pd_geometry", "test_pd_lattice", "test_pd_rows")
+QUICK_SUITES = ("test_pd_cloud", "test_pd_geometry", "test_pd_lattice", "test_pd_result")
 # What a fault of faults.f90 must be called.
 FAULTS = {
     "beyond the end": "heap-buffer-overflow",
