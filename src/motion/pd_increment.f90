@@ -25,6 +25,7 @@ module pd_increment
   private
 
   public :: increments_t, new_increments, begin_increments, take_increment, take_back
+  public :: next_length
 
   !> A number of an increment that stands out.
   type :: moment_t
