@@ -13,6 +13,7 @@ sys.path.insert(0, str(PROOFS))  # what they share
 import addresses  # noqa: E402
 import compilers  # noqa: E402
 import pythons  # noqa: E402
+import sanitize  # noqa: E402
 import verdicts  # noqa: E402
 
 FOOTING = """\
@@ -79,3 +80,9 @@ def test_the_quick_form_of_addresses_names_suites_that_are_there():
 @pytest.mark.parametrize("name", ["compilers", "pythons", "fuzz", "soak", "sanitize", "mutants"])
 def test_every_proof_has_a_target(name):
     assert f"\n{name}:" in (ROOT / "Makefile").read_text()
+
+
+@pytest.mark.parametrize("name", sanitize.PLANTS)
+def test_races_can_be_planted(name):
+    path, text, _ = sanitize.PLANTS[name]
+    assert (ROOT / path).read_text().count(text) == 1

@@ -75,9 +75,9 @@ PLANTS = {
     ),
     "blocks overlap by a row": (
         "src/motion/pd_forces.f90",
-        "        operators%domain%blocks%hi(block), state%displacement, state%force)\n",
-        "        min(operators%domain%blocks%hi(block) + 1, size(state%force, 1)), &\n"
-        "        state%displacement, state%force)\n",
+        "          operators%domain%blocks%hi(blocks(k)), state%displacement, state%force)\n",
+        "          min(operators%domain%blocks%hi(blocks(k)) + 1, size(state%force, 1)), &\n"
+        "          state%displacement, state%force)\n",
     ),
 }
 
