@@ -38,25 +38,22 @@ def interrupted(program, folder, text, words, *options):
 
 
 @pytest.mark.parametrize(
-    ("case", "words", "rows"),
-    [
-        ("stages", "perigeo ", 1),
-        ("increments", "step 2/", 3),
-        ("stages", "'dig' begins", 4),
-    ],
+    ("case", "words"),
+    [("stages", "perigeo "), ("increments", "step 2/"), ("stages", "'dig' begins")],
 )
-def test_an_increment_is_taken_back(program, run_case, tmp_path, case, words, rows):
+def test_an_increment_is_taken_back(program, run_case, tmp_path, case, words):
     text = SLOW[case]
     log = interrupted(program, tmp_path, text, words)
     assert log.splitlines()[-1].startswith("stopped by a signal")
     assert "\nquality so far: energy error" in log
     out = tmp_path / "out"
-    assert len(history(out / "case_history.csv")["step"]) == rows
+    rows = len(history(out / "case_history.csv")["step"])
     (tmp_path / "straight").mkdir()
     for folder, options in ((tmp_path, ("--restart",)), (tmp_path / "straight", ())):
         done = run_case(text, folder, "--quiet", "--threads", "1", *options)
         assert done.returncode == 0, done.stderr
     assert_same(out, tmp_path / "straight" / "out")
+    assert 1 <= rows < len(history(out / "case_history.csv")["step"])
 
 
 def test_a_try_of_a_factor_of_safety_is_no_answer(program, run_case, tmp_path):
