@@ -6,7 +6,7 @@
 module pd_affine_support
   use pd_kinds, only: ordered_sum, wp
   use pd_point_sets, only: point_set_t
-  use pd_supports, only: n_sums, support_t
+  use pd_supports, only: n_sums, sum_of_forces, support_t
   use pd_tables, only: table_t
   implicit none
   private
@@ -88,7 +88,7 @@ contains
     real(wp) :: sums(n_sums)   !! x, y [N/m], with the mode [W/m]
 
     associate (p => self%points(first:last), m => self%mode(:, first:last))
-      sums = [ordered_sum(volume(p) * f(p, 1)), ordered_sum(volume(p) * f(p, 2)), &
+      sums = [sum_of_forces(p, volume, f), &
         ordered_sum(volume(p) * (f(p, 1) * m(1, :) + f(p, 2) * m(2, :)))]
     end associate
   end function add_up

@@ -8,10 +8,10 @@
 !> of its points.
 !> Source: doc/theory.md, section 7.
 module pd_loaded_platen
-  use pd_kinds, only: wp
+  use pd_kinds, only: ordered_sum, wp
   use pd_point_sets, only: point_set_t
   use pd_rigid_support, only: rigid_support_t
-  use pd_supports, only: n_sums, support_t
+  use pd_supports, only: n_sums, sum_of_forces, support_t
   use pd_tables, only: new_ramp, table_t
   use pd_text, only: short_number
   implicit none
@@ -30,6 +30,7 @@ module pd_loaded_platen
   contains
     procedure :: mark_prescribed
     procedure :: prescribe
+    procedure :: add_up
     procedure :: share_forces
     procedure :: mark_read
     procedure :: take_reactions
@@ -78,6 +79,18 @@ contains
     associate (unused => self, unused_t => t, unchanged_u => u, unchanged_v => v)
     end associate
   end subroutine prescribe
+
+  !> V f, and V.
+  pure function add_up(self, first, last, volume, f) result(sums)
+    class(loaded_platen_t), intent(in) :: self
+    integer,                intent(in) :: first, last
+    real(wp),               intent(in) :: volume(:), f(:, :)
+    real(wp) :: sums(n_sums)   !! x, y [N/m], V [m^2]
+
+    associate (points => self%points(first:last))
+      sums = [sum_of_forces(points, volume, f), ordered_sum(volume(points))]
+    end associate
+  end function add_up
 
   !> f <- (sum V f + r F) / sum V at its points.
   pure subroutine share_forces(self, sums, t, f)

@@ -13,7 +13,7 @@ module pd_supports
   implicit none
   private
 
-  public :: support_t, support_item_t, supports_t, n_sums
+  public :: support_t, support_item_t, supports_t, n_sums, sum_of_forces
 
   integer, parameter :: n_sums = 3   !! numbers that a support adds up over its points
 
@@ -118,19 +118,26 @@ contains
 
   ! --- defaults, right for most supports
 
-  !> What some of its points add to the sums: V f, and V.
+  !> What some of its points add to the sums: V f; a third number is for kinds that need one.
   pure function add_up_forces(self, first, last, volume, f) result(sums)
     class(support_t), intent(in) :: self
     integer,          intent(in) :: first, last       !! of its points
     real(wp),         intent(in) :: volume(:)         !! V (n) [m^2]
     real(wp),         intent(in) :: f(:, :)           !! (n,2) [N/m^3]
-    real(wp) :: sums(n_sums)                          !! x, y [N/m], V [m^2]
+    real(wp) :: sums(n_sums)                          !! x, y [N/m], 0
 
-    associate (points => self%points(first:last))
-      sums = [ordered_sum(volume(points) * f(points, 1)), &
-        ordered_sum(volume(points) * f(points, 2)), ordered_sum(volume(points))]
-    end associate
+    sums = [sum_of_forces(self%points(first:last), volume, f), 0.0_wp]
   end function add_up_forces
+
+  !> sum V f over some points [N/m].
+  pure function sum_of_forces(points, volume, f) result(force)
+    integer,  intent(in) :: points(:)
+    real(wp), intent(in) :: volume(:)                 !! V (n) [m^2]
+    real(wp), intent(in) :: f(:, :)                   !! (n,2) [N/m^3]
+    real(wp) :: force(2)
+
+    force = [ordered_sum(volume(points) * f(points, 1)), ordered_sum(volume(points) * f(points, 2))]
+  end function sum_of_forces
 
   !> Change the force density so that points which move as one keep doing so: here there are none.
   pure subroutine share_nothing(self, sums, t, f)

@@ -235,8 +235,8 @@ contains
     call h5dget_space_f(dataset, space, status)
     if (status >= 0) then
       call h5sget_simple_extent_ndims_f(space, rank, status)
-      call h5sselect_hyperslab_f(space, h5s_select_set_f, start(3 - rank:), length(3 - rank:), &
-        status)
+      if (status >= 0) call h5sselect_hyperslab_f(space, h5s_select_set_f, start(3 - rank:), &
+        length(3 - rank:), status)
       if (status >= 0) call h5screate_simple_f(rank, length(3 - rank:), part, status)
       if (status >= 0) then
         call h5dwrite_f(dataset, h5t_native_double, c_loc(values), status, part, space)
