@@ -165,7 +165,7 @@ contains
     type(traffic_t), intent(in)    :: sent
     real(wp), parameter :: latency = 2.0e-6_wp     !! of a message [s]
     real(wp), parameter :: bandwidth = 1.0e10_wp   !! of a rank [bytes/s]
-    !> Of the time of a step: gradient and stress, force.
+    !> Of the time of a step: gradient and stress, force; as the kernels of a log, m = 4.
     real(wp), parameter :: during(2) = [0.6_wp, 0.25_wp]
     real(wp) :: alone, largest, exchanges(2), hidden(2), reductions
 

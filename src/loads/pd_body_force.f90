@@ -28,7 +28,6 @@ module pd_body_force
                                                   !! allocated: this rank has all of b
   contains
     procedure :: add_forces
-    procedure :: work
     procedure :: add_block_work
     procedure :: description
     procedure :: acceleration
@@ -94,16 +93,6 @@ contains
       !$omp end parallel do simd
     end do
   end subroutine add_forces
-
-  !> All of it is added up block by block.
-  real(wp) function work(self, v, t, t_next)
-    class(body_force_t), intent(in) :: self
-    real(wp),            intent(in) :: v(:, :), t, t_next
-
-    associate (unused => self, unused_v => v, unused_t => [t, t_next])
-    end associate
-    work = 0.0_wp
-  end function work
 
   subroutine add_block_work(self, blocks, v, t, t_next, work)
     class(body_force_t), intent(in)    :: self

@@ -19,11 +19,11 @@ module pd_loads
     real(wp) :: doubted = 0.0_wp                   !! the number that it is about
   contains
     procedure(add_forces),  deferred :: add_forces
-    procedure(work),        deferred :: work
     procedure(description), deferred :: description
     procedure :: acceleration => no_acceleration
     procedure :: mark_read => mark_nothing
     procedure :: divide => nothing_to_divide
+    procedure :: work => no_work
     procedure :: add_block_work => no_block_work
   end type load_t
 
@@ -37,15 +37,6 @@ module pd_loads
       real(wp),      intent(in)    :: t            !! [s]
       real(wp),      intent(inout) :: f(:, :)      !! force density (n,2) [N/m^3]
     end subroutine add_forces
-
-    !> Work from t to t_next, by the trapezoidal rule over the displacement of the step; without
-    !> what is added up block by block.
-    real(wp) function work(self, v, t, t_next)
-      import :: load_t, wp
-      class(load_t), intent(in) :: self
-      real(wp),      intent(in) :: v(:, :)         !! v^{n+1/2} (n,2) [m/s]
-      real(wp),      intent(in) :: t, t_next       !! [s]
-    end function work
 
     !> What `--check` says about it.
     pure function description(self) result(text)
@@ -103,6 +94,18 @@ contains
     associate (unchanged => self, unused => blocks)
     end associate
   end subroutine nothing_to_divide
+
+  !> Work from t to t_next, by the trapezoidal rule over the displacement of the step, which all
+  !> ranks know: here there is none.
+  real(wp) function no_work(self, v, t, t_next) result(work)
+    class(load_t), intent(in) :: self
+    real(wp),      intent(in) :: v(:, :)           !! v^{n+1/2} (n,2) [m/s]
+    real(wp),      intent(in) :: t, t_next         !! [s]
+
+    associate (unused => self, unused_v => v, unused_t => [t, t_next])
+    end associate
+    work = 0.0_wp
+  end function no_work
 
   !> Add the work at points of all blocks, block by block: here there is none.
   subroutine no_block_work(self, blocks, v, t, t_next, work)
