@@ -123,6 +123,93 @@ POLYGON = """\
 &output history_count = 40, frame_count = 2 /
 """
 
+# What builds by stages, rests on planes of symmetry, is in equilibrium, fails: most parts of the
+# program that the cases above leave out, in bodies without a symmetry of their own.
+SOIL = """\
+  density = 2000.0, youngs_modulus = 20.0e6, poissons_ratio = 0.3, yield_stress = 2.0e4
+"""
+AT_REST = "&integration method = 'equilibrium', residual = 1.0e-6, increments = 3"
+SHORT = "&output frame_count = 2, history_count = 12 /\n"
+RESTING = (
+    changed(L_SHAPE, strain_measure=None, families=None, horizon="0.3")
+    .replace("yield_stress = 0.15e6", "yield_stress = 0.06e6")
+    .replace("kinematic_modulus = -1.5e6", "kinematic_modulus = 2.0e6")
+    .replace(", residual_strength = 15.0e3", "")
+    + PLATENS.split("&integration", maxsplit=1)[0]
+    + AT_REST
+    + ", end_time = 0.4 /\n&probe name = 'corner', x = 0.52, y = 0.37 /\n"
+)
+STAGES = f"""\
+&run name = 'case', output_dir = 'out' /
+&discretisation spacing = 0.1, horizon = 0.3, layout = 'cells' /
+&body name = 'ground', x_min = -0.2, x_max = 2.2, y_min = -0.6, y_max = 0.2 /
+&body name = 'bank', x_min = -0.2, x_max = 0.9, y_min = 0.2, y_max = 0.9 /
+&body name = 'pit', x_min = 0.9, x_max = 2.2, y_min = 0.2, y_max = 0.6, material = 'stiff' /
+&body name = 'dam', x_min = -0.2, x_max = 0.4, y_min = 0.9, y_max = 1.3 /
+&material name = 'clay', model = 'j2',{SOIL}  yield_stress_gradient = -5.0e3, reference_y = 0.9 /
+&material name = 'stiff', model = 'j2', strain_measure = 'small',{SOIL}  isotropic_modulus = 1.0e6 /
+&boundary name = 'base', side = 'bottom' /
+&boundary name = 'left', side = 'left', contact = 'smooth' /
+&boundary name = 'right', side = 'right', span = -0.6, 0.2, contact = 'smooth' /
+&pressure name = 'load', body = 'bank', edge = 3, span = 0.05, 0.45, value = 4.0e3, ramp_time = 1.5 /
+&pressure name = 'more', body = 'bank', edge = 2, span = 0.45, 0.7, value = 2.0e3, ramp_time = 0.5 /
+&gravity acceleration = 0.0, -10.0 /
+&initial_stress surface_y = 1.1, unit_weight = 20.0e3, k0 = 0.7, surcharge = 500.0 /
+&stage name = 'rest', end_time = 1.0, boundaries = 'base left right', pressures = 'more' /
+&stage name = 'dig', end_time = 2.0, excavate = 'pit', materials = 'ground=stiff' /
+&stage name = 'fill', end_time = 2.7, fill = 'dam', pressures = 'load' /
+&probe name = 'edge', x = 0.85, y = 0.3 /
+{AT_REST} /
+&output frame_count = 3 /
+"""
+CYLINDER = f"""\
+&run name = 'case', output_dir = 'out' /
+&discretisation spacing = 0.1, horizon = 0.3, layout = 'cells', volumes = 'tributary' /
+&body name = 'quarter', shape = 'polygon', vertices = 0.0, 0.0, 1.3, 0.0, 1.2, 0.7, 0.6, 1.4, 0.0, 1.5 /
+&body name = 'bore', shape = 'circle', role = 'hole', x = 0.0, y = 0.0, radius = 0.57 /
+&material model = 'j2',{SOIL}  kinematic_modulus = 3.0e6, isotropic_modulus = 1.0e6
+  youngs_modulus_gradient = 2.0e6, reference_y = 0.3 /
+&boundary name = 'left', side = 'left', span = 0.0, 1.5, contact = 'smooth' /
+&boundary name = 'bottom', side = 'bottom', span = 0.0, 1.3, contact = 'smooth' /
+&pressure name = 'inside', body = 'bore', value = 14.0e3, ramp_time = 1.0 /
+&random_field coefficient_of_variation = 0.1, correlation_length = 0.4, seed = 5 /
+{AT_REST}, end_time = 1.0 /
+"""
+FOOTING = f"""\
+&run name = 'case', output_dir = 'out' /
+&discretisation spacing = 0.1, horizon = 0.25 /
+&body x_min = -0.3, x_max = 1.4, y_min = -0.9, y_max = 0.1 /
+&cut x = 0.3, 0.75, y = -0.3, -0.3 /
+&material model = 'j2',{SOIL}  strain_measure = 'green_lagrange', isotropic_modulus = 1.0e6
+  yield_stress_gradient = 1.0e4 /
+&boundary name = 'base', side = 'bottom', span = -0.3, 0.5, contact = 'smooth' /
+&boundary name = 'door', side = 'bottom', span = 0.5, 1.4, velocity = 0.001, -0.002 /
+&boundary name = 'wall', side = 'left', contact = 'affine', span = -0.9, 0.1
+  velocity_gradient = 0.0, 0.004, -0.004, 0.0, times = 0.0, 0.2, 0.4, factors = 0.0, 0.0, 1.0 /
+&boundary name = 'footing', side = 'top', span = 0.1, 0.7, velocity = 0.0, -0.004 /
+&gravity acceleration = 0.5, -9.0, ramp_time = 0.3 /
+&stabilisation method = 'relaxing', relaxing_stiffness = 0.3, relaxing_strain = 1.0e-3 /
+{AT_REST.replace("'equilibrium'", "'equilibrium', relaxation = 'accelerated'")}, end_time = 0.6 /
+"""
+FALLING = f"""\
+&run name = 'case', output_dir = 'out' /
+&discretisation spacing = 0.1, horizon = 0.3, layout = 'cells' /
+&body shape = 'polygon', vertices = 0.0, 0.0, 1.6, 0.0, 1.1, 0.9, 0.0, 1.0 /
+&material model = 'j2',{SOIL}  strain_measure = 'small' /
+&boundary name = 'base', side = 'bottom' /
+&boundary name = 'left', side = 'left', contact = 'smooth' /
+&gravity acceleration = 0.0, -20.0, ramp_time = 1.0 /
+{AT_REST.replace("-6", "-5")}, end_time = 1.0 /
+&strength_reduction first = 1.0, last = 3.5, tolerance = 0.4 /
+"""
+UNTIL = """\
+&boundary name = 'bottom', side = 'bottom' /
+&boundary name = 'top', side = 'top', contact = 'smooth', traction = 0.0, -1.0e5, ramp_time = 0.1
+  traction_until = 0.2, velocity = 0.0, -0.01 /
+&stabilisation method = 'relaxing' /
+&integration end_time = 0.4, damping = 2.0e5 /
+"""
+
 CASES = {
     "polygon": POLYGON,
     "lattice": BODY + PLATENS + PATCH,
@@ -148,6 +235,13 @@ CASES = {
     + TABLES
     + CONTROL,
     "sight": L_SHAPE.replace("'distance'", "'line_of_sight'") + CUT + TABLES,
+    "resting": RESTING,
+    "resting_list": changed(RESTING, **LISTED),
+    "stages": STAGES,
+    "cylinder": CYLINDER + SHORT,
+    "footing": FOOTING + SHORT,
+    "falling": FALLING + SHORT,
+    "until": changed(L_SHAPE, strain_measure="'logarithmic'", volumes="'tributary'") + UNTIL,
 }
 RESTARTED = ("field", "loaded", "cloud", "materials", "polygon", "sight")
 
