@@ -36,7 +36,8 @@ CASES = {
     "bodies": ["test_bodies.py", "test_bearings.py", "test_sight.py", "test_thin_bodies.py"],
     "physics": ["test_physics.py", "test_materials.py"],
     "loads": ["test_loads.py", "test_ground.py", "test_random_field.py"],
-    "equilibrium": ["test_equilibrium.py"],
+    "equilibrium": ["test_equilibrium.py", "test_strain_control.py", "test_operators.py"],
+    "stages": ["test_stages.py", "test_stability.py"],
     "frozen": ["test_frozen.py"],
 }
 SLOW = (
@@ -236,6 +237,7 @@ def main() -> int:
         for path, lists in faults.items():
             queue = [f for f in queue_of(lists, chance) if f.key not in earlier]
             jobs += [queue] * parts[path]
+        chance.shuffle(jobs)  # a run that is cut short has seen a fair sample
     with ThreadPoolExecutor(max_workers=len(search.free)) as pool:
         for job in [pool.submit(search.draw, queue) for queue in jobs]:
             job.result()
