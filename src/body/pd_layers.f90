@@ -5,7 +5,7 @@ module pd_layers
   use pd_kinds, only: wp
   use pd_places, only: empty, lattice_t, places_t
   use pd_polygons, only: distance_to_edge, edge_axis, next_vertex, outward_normal
-  use pd_region, only: part_at
+  use pd_region, only: part_at, part_on
   use pd_sides, only: bottom, covers, left, normal_axis, outward, right, side_count, side_names, &
     top
   implicit none
@@ -25,6 +25,7 @@ module pd_layers
     logical :: mirror = .false.                 !! its points are images of the body
   end type layer_t
 
+  integer,  parameter :: outside = -huge(1)   ! owner of what is no place of the box
   real(wp), parameter :: round_off = 1.0e-6_wp
 
 contains
@@ -222,7 +223,7 @@ contains
   !> Mark the fictitious points beyond edges: beyond an edge along an axis whole rows as beyond a
   !> side; beyond an inclined one, or one shorter than a spacing, the empty places whose foot lies
   !> on it, no further away than the horizon. Where two edges with layers meet, the corner outside
-  !> of both is filled too.
+  !> of both is filled too. A hole may reach into the air: where no material is, no layer follows.
   subroutine fill_edges(layer, layers, lattice, places)
     type(layer_t),   intent(in)    :: layer
     type(layer_t),   intent(in)    :: layers(:)
@@ -247,8 +248,10 @@ contains
         if (layer%edge /= 0 .and. layer%edge /= k) cycle
         if (has_layer(layers, layer%shape, before(k), places)) &
           call fill_corner(layer, before(k), k, k, lattice, places)
-        if (layer%edge /= 0 .and. has_layer(layers, layer%shape, after(k), places)) &
-          call fill_corner(layer, k, after(k), after(k), lattice, places)
+        associate (after => next_vertex(shape%vertices, k))
+          if (layer%edge /= 0 .and. has_layer(layers, layer%shape, after, places)) &
+            call fill_corner(layer, k, after, after, lattice, places)
+        end associate
       end do
     end associate
 
@@ -259,12 +262,6 @@ contains
 
       before = modulo(edge - 2, size(places%shapes(layer%shape)%vertices, 2)) + 1
     end function before
-
-    pure integer function after(edge)
-      integer, intent(in) :: edge
-
-      after = modulo(edge, size(places%shapes(layer%shape)%vertices, 2)) + 1
-    end function after
 
   end subroutine fill_edges
 
@@ -341,10 +338,11 @@ contains
     first(across) = line - merge(0, 1, lattice%cells .or. step(across) < 0)
     do i = floor(ends(1) + round_off), ceiling(ends(2) - round_off) - 1
       first(along) = i
+      if (at(places%owner, first) == outside) cycle   ! an edge of a hole, far from the solids
       if (.not. places%filled(first(1), first(2))) cycle
       do j = 1, lattice%rows + 1
         here = first + j * step
-        if (any(here < lbound(places%filled)) .or. any(here > ubound(places%filled))) exit
+        if (at(places%owner, here) == outside) exit
         if (places%filled(here(1), here(2)) .and. j > 1) exit
         places%filled(here(1), here(2)) = .true.
         places%whole(here(1), here(2)) = .true.
@@ -352,12 +350,12 @@ contains
     end do
   end subroutine fill_rows
 
-  !> The value at a place; of a place outside of the box: neither empty nor of the body.
+  !> The value at a place, or `outside`.
   pure integer function at(values, place)
     integer, allocatable, intent(in) :: values(:, :)
     integer, intent(in) :: place(2)
 
-    at = -huge(1)
+    at = outside
     if (any(place < lbound(values)) .or. any(place > ubound(values))) return
     at = values(place(1), place(2))
   end function at
@@ -386,19 +384,21 @@ contains
         call distance_to_edge(a, b, x, distance, foot)
         if (abs(foot - 0.5_wp) > 0.5_wp + round_off) cycle
         if (distance > lattice%reach + round_off .or. dot_product(x - a, normal) <= 0.0_wp) cycle
-        call take(layer, a + min(1.0_wp, max(0.0_wp, foot)) * (b - a), i, j, offset, places)
+        x = a + min(1.0_wp, max(0.0_wp, foot)) * (b - a)
+        if (part_on(places%shapes, x) > 0) call take(layer, x, i, j, offset, places)
       end do
     end do
   end subroutine fill_inclined
 
-  !> Places outside of both edges that meet at a vertex, nearest to it.
+  !> Places outside of both edges that meet at a vertex, nearest to it; none where the material goes
+  !> round the vertex by more than half a turn, as it does at the corners of most holes.
   subroutine fill_corner(layer, first, second, vertex, lattice, places)
     type(layer_t),   intent(in)    :: layer
     integer,         intent(in)    :: first, second   !! edges, in their order
     integer,         intent(in)    :: vertex
     type(lattice_t), intent(in)    :: lattice
     type(places_t),  intent(inout) :: places
-    real(wp) :: ahead(2), apart(2), back(2), corner(2), offset
+    real(wp) :: ahead(2), apart(2), back(2), corner(2), normal(2), offset
     integer  :: i, j, low(2), high(2)
     logical  :: block
 
@@ -408,7 +408,10 @@ contains
       back = v(:, first) - corner
       ahead = v(:, next_vertex(v, second)) - corner
       block = edge_axis(v, first) > 0 .and. edge_axis(v, second) > 0
+      normal = outward_normal(v, first)
     end associate
+    if (.not. places%shapes(layer%shape)%solid) normal = -normal
+    if (dot_product(ahead, normal) > 0.0_wp .or. part_on(places%shapes, corner) == 0) return
     low = max(lbound(places%owner), floor(corner - offset) - lattice%rows - 1)
     high = min(ubound(places%owner), ceiling(corner - offset) + lattice%rows + 1)
     do j = low(2), high(2)
@@ -440,7 +443,7 @@ contains
       if (part_at(places%shapes, foot + real(k, wp) * width / distance * apart) > 0) return
     end do
     places%owner(i, j) = layer%boundary
-    places%part(i, j) = max(1, part_at(places%shapes, foot - beside / distance * apart))
+    places%part(i, j) = max(1, part_on(places%shapes, foot - beside / distance * apart))
     places%whole_cell(i, j) = .true.
   end subroutine take
 
