@@ -76,7 +76,6 @@ contains
     integer :: ends(2)
 
     ends = [1, n]
-    if (.not. allocated(self%blocks%ranks%before)) return
     ! beyond the first and the last row of all there is a margin
     if (self%known(1) > self%blocks%ends(1)) ends(1) = self%known(1)
     if (self%known(2) < self%blocks%ends(2)) ends(2) = self%known(2)

@@ -17,7 +17,8 @@ module pd_halo
     integer, allocatable :: partners(:)
     integer, allocatable :: sent(:), received(:)             !! rows, partner by partner
     integer, allocatable :: sent_ends(:), received_ends(:)   !! last of each; 0: before them (0:)
-    real(wp), allocatable, private :: outbox(:), inbox(:)
+    !> What is on its way: looked at by messages and by tests that carry it themselves.
+    real(wp), allocatable :: outbox(:), inbox(:)
     type(messages_t), private :: messages
   contains
     procedure :: meet

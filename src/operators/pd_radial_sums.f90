@@ -73,9 +73,9 @@ contains
     n = hi - lo + 1 + 2 * sums%margin
     if (wide * n <= most_numbers) then
       ! strands begin at a line of the cache, as fields do: a sixth of the time
-      before = n_line - int(mod(transfer(c_loc(strands), 0_c_intptr_t) / 8_c_intptr_t, &
+      before = int(modulo(-transfer(c_loc(strands), 0_c_intptr_t) / 8_c_intptr_t, &
         int(n_line, c_intptr_t)))
-      call add_groups(sums, lo, n, own, f, strands(before + 1:before + wide * n), total)
+      call add_groups(sums, lo, n, own, f, strands(before + 1:), total)
     else
       allocate (many(wide * n))
       call add_groups(sums, lo, n, own, f, many, total)

@@ -48,7 +48,7 @@ contains
             if (pass == 2) stretches%lo(n) = merge(i, line + 1, i - line > shortest_gap)
           end if
           line = min(i + n_line - 1, blocks%hi(block))
-          if (blocks%hi(block) - line <= shortest_gap) line = blocks%hi(block)
+          if (blocks%hi(block) - line < shortest_gap) line = blocks%hi(block)
           if (pass == 2) stretches%hi(n) = line
         end do
       end do

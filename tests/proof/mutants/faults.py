@@ -13,7 +13,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 WITHOUT_NUMBERS = re.compile(
-    r"forget_rows|lap|lap_blocks|begin|move_alloc|add|complain|exchange|bring|share_rows", re.I
+    r"forget_rows|lap|lap_blocks|begin|move_alloc|add|complain|exchange|bring|share_rows|"
+    r"begin_swap|help|await",
+    re.I,
 )
 NOT_EXECUTED = re.compile(
     r"(use|implicit|private|public|module|submodule|contains|end|type|interface|abstract|import|"
