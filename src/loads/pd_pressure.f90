@@ -171,7 +171,6 @@ contains
     depth = huge(1.0_wp)
     share = 0.0_wp
     total = 0.0_wp
-    pressure%length = 0.0_wp
     associate (w => surface%weights)
       do e = 1, size(w%edges)
         if (.not. chosen(e)) cycle

@@ -166,6 +166,7 @@ contains
     call model%supports%prescribe(t + duration, state%displacement, prescribed)
     associate (mirror => model%operators%mirror)
       if (mirror%n == 0) return
+      call mirror%move(t)   ! a try before may have left the planes elsewhere
       allocate (place, source=mirror%place)
       call mirror%move(t + duration)
       call mirror%carry(mirror%place - place, state%displacement)
