@@ -10,7 +10,7 @@ module pd_platens
   implicit none
   private
 
-  public :: platens_t, new_platens, move_frame, nominal_strain, time_of_strain, reference_ends
+  public :: platens_t, new_platens, move_frame, nominal_strain, reference_ends
   public :: times_of_strains, press_along
 
   type :: platens_t
@@ -81,16 +81,6 @@ contains
     if (platens%axis > 0) strain = (u(platens%points(1), platens%axis) &
       - u(platens%points(2), platens%axis)) / platens%length
   end function nominal_strain
-
-  !> The first time at which the nominal strain reaches a value; -1 as below.
-  pure real(wp) function time_of_strain(platens, strain) result(time)
-    type(platens_t), intent(in) :: platens
-    real(wp),        intent(in) :: strain
-    real(wp) :: times(1)
-
-    times = times_of_strains(platens, [strain])
-    time = times(1)
-  end function time_of_strain
 
   !> The first times at which the nominal strain reaches values; -1 where it never does, or where
   !> that is not known beforehand.
