@@ -235,8 +235,6 @@ contains
     call clear_rows(shared, kept)
     if (.not. allocated(self%control)) allocate (self%control, mold=shared)
     if (.not. allocated(self%stiffness)) allocate (self%stiffness, mold=shared)
-    call clear_rows(self%control, kept)
-    call clear_rows(self%stiffness, kept)
     self%control(kept(1):kept(2)) = c(kept(1):kept(2))
     shared(kept(1):kept(2)) = self%share_of(kept(1):kept(2)) * c(kept(1):kept(2))
     call self%domain%make_room(self%n, 2, self%pull)
