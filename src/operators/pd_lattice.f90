@@ -123,7 +123,6 @@ contains
     blocks = operators%domain%blocks
     kept = operators%domain%kept(operators%n)
     allocate (operators%weight_sum(operators%n), operators%moment(operators%n, 2))
-    call clear_rows(operators%weight_sum, kept)
     call clear_rows(operators%moment, kept)
     operators%weight_sum(kept(1):kept(2)) = 1.0_wp
     allocate (found(blocks%count))
@@ -340,11 +339,9 @@ contains
     end do
     !$omp end parallel do
     associate (a => self%domain%blocks%first, b => self%domain%blocks%last)
-      where (self%share_of(a:b) > 0.0_wp)
+      ! where there is no point, x~ is zero
+      where (self%share_of(a:b) > 0.0_wp) &
         self%residual_weight(a:b) = self%residual_weight(a:b) / self%share_of(a:b)
-      else where
-        self%residual_weight(a:b) = 0.0_wp
-      end where
     end associate
   end subroutine weigh_residuals
 
