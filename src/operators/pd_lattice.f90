@@ -123,7 +123,6 @@ contains
     blocks = operators%domain%blocks
     kept = operators%domain%kept(operators%n)
     allocate (operators%weight_sum(operators%n), operators%moment(operators%n, 2))
-    call clear_rows(operators%moment, kept)
     operators%weight_sum(kept(1):kept(2)) = 1.0_wp
     allocate (found(blocks%count))
     !$omp parallel do schedule(static) default(none) private(block) shared(operators, blocks, found)
