@@ -123,8 +123,6 @@ contains
     blocks = operators%domain%blocks
     kept = operators%domain%kept(operators%n)
     allocate (operators%weight_sum(operators%n), operators%moment(operators%n, 2))
-    call clear_rows(operators%weight_sum, kept)
-    call clear_rows(operators%moment, kept)
     operators%weight_sum(kept(1):kept(2)) = 1.0_wp
     allocate (found(blocks%count))
     !$omp parallel do schedule(static) default(none) private(block) shared(operators, blocks, found)
@@ -235,8 +233,6 @@ contains
     call clear_rows(shared, kept)
     if (.not. allocated(self%control)) allocate (self%control, mold=shared)
     if (.not. allocated(self%stiffness)) allocate (self%stiffness, mold=shared)
-    call clear_rows(self%control, kept)
-    call clear_rows(self%stiffness, kept)
     self%control(kept(1):kept(2)) = c(kept(1):kept(2))
     shared(kept(1):kept(2)) = self%share_of(kept(1):kept(2)) * c(kept(1):kept(2))
     call self%domain%make_room(self%n, 2, self%pull)
@@ -342,11 +338,9 @@ contains
     end do
     !$omp end parallel do
     associate (a => self%domain%blocks%first, b => self%domain%blocks%last)
-      where (self%share_of(a:b) > 0.0_wp)
+      ! where there is no point, x~ is zero
+      where (self%share_of(a:b) > 0.0_wp) &
         self%residual_weight(a:b) = self%residual_weight(a:b) / self%share_of(a:b)
-      else where
-        self%residual_weight(a:b) = 0.0_wp
-      end where
     end associate
   end subroutine weigh_residuals
 

@@ -102,14 +102,13 @@ contains
     integer,             intent(in)    :: k
     real(wp),            intent(in)    :: image(:, :)   !! (n,2)
     real(wp), allocatable :: r(:, :)
-    integer :: c, column, row, l, m, rows
+    integer :: c, column, row, l, m
 
     allocate (r(self%n, 2))
     call self%sums(image, r)
-    rows = self%n / self%columns
     do l = 1, self%n
       ! of the functions of a colour l meets one at most
-      do row = max(0, (l - 1) / self%columns - reach), min(rows - 1, (l - 1) / self%columns + reach)
+      do row = max(0, (l - 1) / self%columns - reach), (l - 1) / self%columns   ! m <= l
         do column = max(0, modulo(l - 1, self%columns) - reach), &
           min(self%columns - 1, modulo(l - 1, self%columns) + reach)
           m = 1 + column + self%columns * row
@@ -150,8 +149,7 @@ contains
     self%matrix(0, :) = (1.0_wp + little) * stiffness
     do k = 1, self%n
       if (self%matrix(0, k) <= least * stiffness(k)) then
-        self%matrix(0, k) = stiff
-        self%matrix(1:, k) = 0.0_wp
+        self%matrix(0, k) = stiff   ! whatever stands below it has no weight then
         cycle
       end if
       self%matrix(0, k) = sqrt(self%matrix(0, k))
