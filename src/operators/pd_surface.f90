@@ -108,7 +108,7 @@ contains
       field(i, :) = merge(volume(i) * tilt(i, 1), 1.0_wp, tilt(i, 1) > 0.0_wp) * before(i, :)
       do b = list%first(i), list%first(i + 1) - 1
         j = list%neighbour(b)
-        if (.not. zone(j) .or. tilt(j, 1) <= 0.0_wp) cycle
+        if (.not. zone(j)) cycle
         d = list%position(i, :) - list%position(j, :)
         part = list%weight(b) * (tilt(j, 1) + tilt(j, 2) * d(1) + tilt(j, 3) * d(2))
         field(i, :) = field(i, :) + part * before(j, :)
