@@ -301,7 +301,7 @@ contains
       end do
       return
     end if
-    allocate (parts(n_sums, size(self%runs, 2)))
+    allocate (parts(n_sums, size(self%runs, 2)), source=0.0_wp)   ! the others come from their ranks
     do k = self%first_run, self%last_run
       associate (run => self%runs(:, k))
         parts(:, k) = self%items(run(1))%support%add_up(run(2), run(3), volume, f)
