@@ -97,3 +97,10 @@ def test_listed_faults_can_be_read(name):
         assert path.startswith("src/")
         assert old != new
         assert said or name == "earlier.txt", f"no reason is given for {old}"
+
+
+def test_listed_faults_can_be_planted():
+    known = {f.key for lists in mutants.all_faults("").values() for here in lists for f in here}
+    for name in ("equivalent.txt", "earlier.txt"):
+        gone = mutants.read_list(name).keys() - known
+        assert not gone, f"{name}: no longer in the sources"
