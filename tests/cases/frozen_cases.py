@@ -151,7 +151,8 @@ STAGES = f"""\
 &boundary name = 'base', side = 'bottom' /
 &boundary name = 'left', side = 'left', contact = 'smooth' /
 &boundary name = 'right', side = 'right', span = -0.6, 0.2, contact = 'smooth' /
-&pressure name = 'load', body = 'bank', edge = 3, span = 0.05, 0.45, value = 4.0e3, ramp_time = 1.5 /
+&pressure name = 'load', body = 'bank', edge = 3, span = 0.05, 0.45, value = 4.0e3
+  ramp_time = 1.5 /
 &pressure name = 'more', body = 'bank', edge = 2, span = 0.45, 0.7, value = 2.0e3, ramp_time = 0.5 /
 &gravity acceleration = 0.0, -10.0 /
 &initial_stress surface_y = 1.1, unit_weight = 20.0e3, k0 = 0.7, surcharge = 500.0 /
@@ -165,7 +166,8 @@ STAGES = f"""\
 CYLINDER = f"""\
 &run name = 'case', output_dir = 'out' /
 &discretisation spacing = 0.1, horizon = 0.3, layout = 'cells', volumes = 'tributary' /
-&body name = 'quarter', shape = 'polygon', vertices = 0.0, 0.0, 1.3, 0.0, 1.2, 0.7, 0.6, 1.4, 0.0, 1.5 /
+&body name = 'quarter', shape = 'polygon'
+  vertices = 0.0, 0.0, 1.3, 0.0, 1.2, 0.7, 0.6, 1.4, 0.0, 1.5 /
 &body name = 'bore', shape = 'circle', role = 'hole', x = 0.0, y = 0.0, radius = 0.57 /
 &material model = 'j2',{SOIL}  kinematic_modulus = 3.0e6, isotropic_modulus = 1.0e6
   youngs_modulus_gradient = 2.0e6, reference_y = 0.3 /
