@@ -32,13 +32,14 @@ else ifeq ($(BUILD),lint)
   unit_flags = $(FFLAGS) $(warnings) -Wno-compare-reals $(no_false_warnings)
 else ifeq ($(BUILD),mutants)
   # The checks of the checking build, quicker, and all modules in a library: one is compiled anew
-  # without linking program and suites.
-  FFLAGS = -O1 -fPIC -fcheck=bounds -ffpe-trap=invalid,zero,overflow -finit-real=snan
+  # without linking program and suites. Variables that are not set have numbers that do harm.
+  FFLAGS = -O1 -fPIC -fcheck=bounds -ffpe-trap=invalid,zero,overflow -finit-real=snan \
+    -finit-integer=-77777 -finit-logical=false
   march  =
   ALIGNED = 0
-  program = build/mutants/perigeo
+  program = build/mutants/perigeo$(if $(MPI),-mpi)
   unit_flags = -O0 -ffpe-trap=invalid,zero,overflow
-  library = build/mutants/libperigeo.so
+  library = build/mutants/libperigeo$(if $(MPI),-mpi).so
 else
   $(error BUILD=$(BUILD): it must be opt or debug)
 endif
@@ -230,7 +231,9 @@ scaling:           ## predicted efficiency of many ranks; PUBLISH=1: into doc/pa
 
 mutants:           ## plant faults in the physics, one at a time: do the tests notice? COUNT= SEED=
 	@sh tools/setup.sh test
+	@sh tools/setup.sh mpi
 	@$(submake) $(parallel) BUILD=mutants PFUNIT_DIR= program units
+	@$(submake) $(parallel) BUILD=mutants MPI=1 program
 	@$(venv)/bin/python tests/proof/mutants/mutants.py $(if $(COUNT),--count $(COUNT)) \
 	  $(if $(SEED),--seed $(SEED)) $(if $(ONLY),--only $(ONLY))
 
@@ -329,7 +332,8 @@ $(program): $(objects) $(library)
 
 ifneq ($(library),)
 $(library): $(filter-out %/perigeo.o,$(objects))
-	$(call say,link     $@)$(FC) $(flags) -shared -Wl,-soname,$(notdir $@) -o $@ $^ $(hdf5_link)
+	$(call say,link     $@)$(FC) $(flags) -shared -Wl,-soname,$(notdir $@) -o $@ $^ $(hdf5_link) \
+	  $(mpi_link)
 endif
 
 $(build)/%.o: %.f90 $(build)/flags

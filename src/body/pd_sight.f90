@@ -185,17 +185,17 @@ contains
         .or. self%filled(high(1), low(2):high(2)))
       if (d(2) == 0) inside = all(self%filled(low(1):high(1), low(2)) &
         .or. self%filled(low(1):high(1), high(2)))
-      return
-    end if
-    do y = low(2), high(2)
-      do x = low(1), high(1)
-        ! a square is crossed where its corners lie on both sides of the line
-        corner = d(1) * (2 * y - a(2)) - d(2) * (2 * x - a(1))
-        least = corner + min(0, 2 * d(1)) + min(0, -2 * d(2))
-        most = corner + max(0, 2 * d(1)) + max(0, -2 * d(2))
-        if (least < 0 .and. most > 0) inside = inside .and. self%filled(x, y)
+    else
+      do y = low(2), high(2)
+        do x = low(1), high(1)
+          ! a square is crossed where its corners lie on both sides of the line
+          corner = d(1) * (2 * y - a(2)) - d(2) * (2 * x - a(1))
+          least = corner + min(0, 2 * d(1)) + min(0, -2 * d(2))
+          most = corner + max(0, 2 * d(1)) + max(0, -2 * d(2))
+          if (least < 0 .and. most > 0) inside = inside .and. self%filled(x, y)
+        end do
       end do
-    end do
+    end if
   end function through_material
 
   !> Half of a whole number, rounded down.

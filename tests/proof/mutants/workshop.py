@@ -1,7 +1,8 @@
 """Build one faulty program at a time and run the tests that could notice.
 
 All modules are in a shared library, so a fault costs one compilation and one link. Each worker
-has a folder of its own with its library; program and suites find it by LD_LIBRARY_PATH.
+has a folder of its own with its library; program and suites find it by LD_LIBRARY_PATH. The program
+for several ranks has another library, which is built where all other checks have passed.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from faults import Fault
 
 ROOT = Path(__file__).resolve().parents[3]
 BUILD = ROOT / "build" / "mutants"
-LIBRARY = "libperigeo.so"
+RANKS_BUILD = ROOT / "build" / "mutants-mpi"
 COMPILE_LIMIT = 120  # seconds
 
 
@@ -119,14 +120,69 @@ def suites(folder: Path) -> list[Check]:
     return found
 
 
-def case_groups(groups: dict[str, list[str]], but_for: str) -> list[Check]:
-    """Return groups of pytest cases that run the program, those left out that take long."""
+def case_groups(groups: dict[str, list[str]], chosen: str, kind: str = "case") -> list[Check]:
+    """Return groups of pytest cases that run the program, those that an expression chooses."""
     pytest = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", "--color=no"]
-    pytest += ["-k", f"not ({but_for})"]
     return [
-        Check(name, [*pytest, *(f"tests/cases/{file}" for file in files)], kind="case")
+        Check(name, [*pytest, "-k", chosen, *(f"tests/cases/{f}" for f in files)], kind=kind)
         for name, files in groups.items()
     ]
+
+
+class Library:
+    """A library of all modules in the folder of a worker, one of which may have a fault."""
+
+    def __init__(self, build: Path, name: str, folder: Path, env: dict[str, str]) -> None:
+        self.build = build
+        self.name = name
+        self.folder = folder
+        self.env = env
+        (folder / build.name).mkdir()
+        words = shlex.split((build / "flags").read_text())
+        # the folder of the modules comes last for -J: what a fault compiles must not go there
+        self.words = [w for w in words if w not in (f"-J{build.relative_to(ROOT)}", "-Wall")]
+        self.objects = {o.stem: o for o in sorted(build.glob("*.o")) if o.stem != "perigeo"}
+        self.healthy: dict[str, bytes] = {}
+
+    def compile(self, path: str, text: str) -> bytes | None:
+        """Compile a source file under its own name; return the object file, None if it fails."""
+        source = self.folder / path
+        source.parent.mkdir(parents=True, exist_ok=True)
+        source.write_text(text)
+        target = self.object_of(path)
+        target.unlink(missing_ok=True)
+        words = [*self.words, f"-I{self.build}", f"-J{self.build.name}", "-w", "-c", path]
+        words += ["-o", str(target)]
+        status, _ = run_bounded(words, self.folder, self.env, COMPILE_LIMIT)
+        return target.read_bytes() if status == 0 else None
+
+    def object_of(self, path: str) -> Path:
+        """Return the object file of a source with a fault."""
+        return self.folder / self.build.name / f"{Path(path).stem}.o"
+
+    def make(self, fault: Fault | None) -> str:
+        """Make the library with a fault; return `no compilation` or `same` where there is none."""
+        objects = dict(self.objects)
+        if fault:
+            text = (ROOT / fault.path).read_text()
+            if fault.path not in self.healthy:
+                self.healthy[fault.path] = self.compile(fault.path, text) or b""
+            compiled = self.compile(fault.path, fault.plant(text))
+            if compiled is None:
+                return "no compilation"
+            if compiled == self.healthy[fault.path]:
+                return "same"
+            objects[Path(fault.path).stem] = self.object_of(fault.path)
+        library = self.folder / self.name
+        library.unlink(missing_ok=True)
+        words = [*self.words, "-shared", f"-Wl,-soname,{self.name}", "-o", str(library)]
+        words += map(str, objects.values())
+        # libraries stand at the end of a command
+        words += [w for w in self.words if w.startswith(("-l", "-L"))]
+        status, output = run_bounded(words, ROOT, self.env, COMPILE_LIMIT)
+        if status:
+            raise RuntimeError(f"the library cannot be linked:\n{output}")
+        return ""
 
 
 class Workshop:
@@ -135,68 +191,28 @@ class Workshop:
     def __init__(self, number: int) -> None:
         self.folder = BUILD / f"worker-{os.getpid()}-{number}"
         (self.folder / "run").mkdir(parents=True)
-        words = shlex.split((BUILD / "flags").read_text())
-        # the folder of the modules comes last for -J: what a fault compiles must not go there
-        self.words = [w for w in words if w not in (f"-J{BUILD.relative_to(ROOT)}", "-Wall")]
-        objects = sorted(BUILD.glob("*.o"))
-        self.objects = {o.stem: o for o in objects if o.stem != "perigeo"}
-        self.healthy: dict[str, bytes] = {}
         self.env = {
             **os.environ,
             "LD_LIBRARY_PATH": str(self.folder),
             "PERIGEO_ROOT": str(ROOT),
             "PERIGEO_BIN": str(BUILD / "perigeo"),
+            "MALLOC_PERTURB_": "165",  # what is not set has no number that happens to be right
             "OMP_NUM_THREADS": "1",
             "OMP_WAIT_POLICY": "passive",
             "MPLBACKEND": "Agg",
             "TMPDIR": str(self.folder / "run"),
         }
+        self.library = Library(BUILD, "libperigeo.so", self.folder, self.env)
+        self.ranks = Library(RANKS_BUILD, "libperigeo-mpi.so", self.folder, self.env)
 
     def close(self) -> None:
         """Remove the folder."""
         shutil.rmtree(self.folder, ignore_errors=True)
 
-    def compile(self, path: str, text: str) -> bytes | None:
-        """Compile a source file under its own name; return the object file, None if it fails."""
-        source = self.folder / path
-        source.parent.mkdir(parents=True, exist_ok=True)
-        source.write_text(text)
-        target = self.folder / f"{source.stem}.o"
-        target.unlink(missing_ok=True)
-        words = [*self.words, f"-I{BUILD}", "-J.", "-w", "-c", path, "-o", target.name]
-        status, _ = run_bounded(words, self.folder, self.env, COMPILE_LIMIT)
-        return target.read_bytes() if status == 0 else None
-
-    def build(self, fault: Fault | None) -> str:
-        """Make the library with a fault; return `no compilation` or `same` where there is none."""
-        objects = dict(self.objects)
-        if fault:
-            text = (ROOT / fault.path).read_text()
-            name = Path(fault.path).stem
-            if fault.path not in self.healthy:
-                self.healthy[fault.path] = self.compile(fault.path, text) or b""
-            compiled = self.compile(fault.path, fault.plant(text))
-            if compiled is None:
-                return "no compilation"
-            if compiled == self.healthy[fault.path]:
-                return "same"
-            objects[name] = self.folder / f"{name}.o"
-        library = self.folder / LIBRARY
-        library.unlink(missing_ok=True)
-        words = [
-            *self.words,
-            "-shared",
-            f"-Wl,-soname,{LIBRARY}",
-            "-o",
-            str(library),
-            *map(str, objects.values()),
-        ]
-        # libraries stand at the end of a command
-        words += [w for w in self.words if w.startswith(("-l", "-L"))]
-        status, output = run_bounded(words, ROOT, self.env, COMPILE_LIMIT)
-        if status:
-            raise RuntimeError(f"the library cannot be linked:\n{output}")
-        return ""
+    def build(self) -> None:
+        """Make both libraries, without a fault."""
+        self.library.make(None)
+        self.ranks.make(None)
 
     def run(self, check: Check) -> tuple[str, float]:
         """Run a check; return how it failed (nothing: it passed) and the processor's seconds."""
@@ -204,7 +220,7 @@ class Workshop:
         shutil.rmtree(scratch, ignore_errors=True)
         scratch.mkdir()
         words = list(check.words)
-        if check.kind == "case":
+        if check.kind != "unit":
             words.append(f"--basetemp={scratch / 'cases'}")
         begin = children_seconds()
         folder = scratch if check.kind == "unit" else ROOT
@@ -214,9 +230,11 @@ class Workshop:
     def judge(self, fault: Fault, checks: list[Check]) -> Finding:
         """Build with a fault and run the checks until one notices."""
         begin = time.monotonic()
-        finding = Finding(fault, self.build(fault) or "alive")
+        finding = Finding(fault, self.library.make(fault) or "alive")
         if finding.verdict == "alive":
             for check in in_order(Path(fault.path).stem, checks):
+                if check.kind == "ranks":
+                    self.ranks.make(fault)
                 how, _ = self.run(check)
                 if how:
                     finding.verdict, finding.by, finding.how = "caught", check.name, how
