@@ -355,19 +355,18 @@ contains
     type(places_t),  intent(inout) :: places
     type(lattice_t), intent(in)    :: lattice
     type(body_t),    intent(inout) :: body    !! in: with its grid
-    integer :: ix, iy, k, low(2), high(2)
+    integer :: ix, iy, k, low, high
 
-    call occupied_box(places, low, high)
-    low(2) = max(low(2), lbound(places%owner, 2) + 1)
-    high(2) = min(high(2), ubound(places%owner, 2) - 1)
-    body%n = count(places%owner(:, low(2):high(2)) /= empty)
+    low = lbound(places%owner, 2) + 1
+    high = ubound(places%owner, 2) - 1
+    body%n = count(places%owner(:, low:high) /= empty)
     allocate (body%position(body%n, 2), body%volume(body%n), source=0.0_wp)
     allocate (body%boundary(body%n), body%place(body%n, 2), source=0)
     allocate (places%number, mold=places%owner)
     places%number = 0
     k = 0
-    do iy = low(2), high(2)
-      do ix = low(1), high(1)
+    do iy = low, high
+      do ix = lbound(places%owner, 1), ubound(places%owner, 1)
         if (places%owner(ix, iy) == empty) cycle
         k = k + 1
         places%number(ix, iy) = k
@@ -381,38 +380,5 @@ contains
     if (lattice%tributary) call give_slivers(places, lattice, body%volume)
     body%volume = body%volume * lattice%spacing**2
   end subroutine number_points
-
-  !> Lowest and highest column and row that hold a point.
-  pure subroutine occupied_box(places, low, high)
-    type(places_t), intent(in)  :: places
-    integer,        intent(out) :: low(2), high(2)
-    integer :: k, line(2)
-
-    do k = 1, 2
-      line = [lbound(places%owner, k), ubound(places%owner, k)]
-      low(k) = line(1)
-      do while (low(k) < line(2))
-        if (holds_points(places, k, low(k))) exit
-        low(k) = low(k) + 1
-      end do
-      high(k) = line(2)
-      do while (high(k) > low(k))
-        if (holds_points(places, k, high(k))) exit
-        high(k) = high(k) - 1
-      end do
-    end do
-  end subroutine occupied_box
-
-  !> Whether a column (axis 1) or row (axis 2) holds a point.
-  pure logical function holds_points(places, axis, line)
-    type(places_t), intent(in) :: places
-    integer,        intent(in) :: axis, line
-
-    if (axis == 1) then
-      holds_points = any(places%owner(line, :) /= empty)
-    else
-      holds_points = any(places%owner(:, line) /= empty)
-    end if
-  end function holds_points
 
 end module pd_geometry
