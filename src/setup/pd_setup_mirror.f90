@@ -56,6 +56,7 @@ contains
     type(point_set_t) :: set
     integer, allocatable :: row(:), origin(:), plane(:), support(:), normal(:)
     type(table_t), allocatable :: velocity(:)
+    type(table_t) :: along_normal   ! gfortran loses the parts of a result in a constructor
     integer :: k
 
     allocate (row(0), origin(0), plane(0), support(0), normal(0), velocity(0))
@@ -65,7 +66,8 @@ contains
       if (size(set%points) == 0) cycle
       support = [support, k]
       normal = [normal, input%boundaries(k)%axis]
-      velocity = [velocity, model%supports%items(k)%support%common_velocity(normal(size(normal)))]
+      along_normal = model%supports%items(k)%support%common_velocity(normal(size(normal)))
+      velocity = [velocity, along_normal]
       row = [row, set%points]
       origin = [origin, images_of(set%points, model%body%boundary, model%body%place, &
         input%boundaries(k)%axis, rows)]
