@@ -73,13 +73,15 @@ contains
     type(model_t), intent(in) :: model
     type(edge_t), allocatable, intent(out) :: edges(:)
     type(edge_t), allocatable :: given(:)
-    type(bodies_t) :: bodies
+    type(bodies_t)  :: bodies
+    type(polygon_t) :: polygon   ! gfortran loses the parts of a result in a constructor
     integer :: k
 
     allocate (given(0), bodies%list(0))
     do k = 1, size(input%bodies)
-      if (stage%has_body(k)) bodies%list = [bodies%list, &
-        polygon_t(outline(input%bodies(k), model%spacing), input%bodies(k)%role /= 'hole')]
+      polygon%vertices = outline(input%bodies(k), model%spacing)
+      polygon%solid = input%bodies(k)%role /= 'hole'
+      if (stage%has_body(k)) bodies%list = [bodies%list, polygon]
       given = [given, rim_edges(outline(input%bodies(k), model%spacing), &
         input%bodies(k)%role == 'hole')]
     end do
