@@ -233,8 +233,8 @@ class Workshop:
         finding = Finding(fault, self.library.make(fault) or "alive")
         if finding.verdict == "alive":
             for check in in_order(Path(fault.path).stem, checks):
-                if check.kind == "ranks":
-                    self.ranks.make(fault)
+                if check.kind == "ranks" and self.ranks.make(fault):
+                    continue  # not another program: the library is that of an earlier fault
                 how, _ = self.run(check)
                 if how:
                     finding.verdict, finding.by, finding.how = "caught", check.name, how
